@@ -1,0 +1,9 @@
+// What every family of kernels shares with the Python module.
+#pragma once
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+
+void bind_regional(nanobind::module_ &module);
+void bind_encoding(nanobind::module_ &module);
+void bind_diagonal(nanobind::module_ &module);

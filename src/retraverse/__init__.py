@@ -1,0 +1,1 @@
+"""Where on a known route a camera is now."""

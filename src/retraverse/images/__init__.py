@@ -1,0 +1,1 @@
+from retraverse.images.frame import Frame as Frame
