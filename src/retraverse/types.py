@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 __all__ = ["Array", "BoolArray", "FloatArray", "ImageArray", "IntArray", "Progress", "no_progress"]
 
-type_ = TypeVar("type_")
+Item = TypeVar("Item")
 
 Array = NDArray[Any]
 """Any array."""
@@ -24,9 +24,11 @@ ImageArray = NDArray[np.uint8]
 class Progress(Protocol):
     """Wraps an iterable and shows how far it has come; see `no_progress`."""
 
-    def __call__(self, items: Iterable[type_], *, total: int, label: str) -> Iterable[type_]: ...
+    def __call__(self, items: Iterable[Item], *, total: int, label: str) -> Iterable[Item]:
+        """Return `items`, of which there are `total`; `label` says what is going on."""
+        ...
 
 
-def no_progress(items: Iterable[type_], *, total: int, label: str) -> Iterable[type_]:
+def no_progress(items: Iterable[Item], *, total: int, label: str) -> Iterable[Item]:
     """Return `items` unchanged: the progress of those who do not watch."""
     return items

@@ -1,1 +1,34 @@
-from retraverse.images.frame import Frame as Frame
+"""Reading pictures: a folder, a pattern, a video, a list of files or arrays becomes a `Traverse`.
+
+Names
+-----
+- `open_traverse`: the one door; says what it takes.
+- `Traverse`, `Frame`: the frames of a drive in order; one picture, decoded when asked.
+- `SkippedFrame`: a frame left out on request, and why.
+- `GreyPath`, `ColourOrder`: the two ways to grey; the channel order of a user's arrays.
+- `decode_grey`, `decode_bgr`: the same decoding for bytes that came from elsewhere.
+- `natural_key`, `PICTURE_SUFFIXES`: how folders are listed.
+
+Importing this package loads neither OpenCV nor Pillow.
+"""
+
+from retraverse.images.decode import ColourOrder, GreyPath, decode_bgr, decode_grey
+from retraverse.images.files import PICTURE_SUFFIXES
+from retraverse.images.frame import Frame
+from retraverse.images.ordering import natural_key
+from retraverse.images.sources import Source, open_traverse
+from retraverse.images.traverse import SkippedFrame, Traverse
+
+__all__ = [
+    "PICTURE_SUFFIXES",
+    "ColourOrder",
+    "Frame",
+    "GreyPath",
+    "SkippedFrame",
+    "Source",
+    "Traverse",
+    "decode_bgr",
+    "decode_grey",
+    "natural_key",
+    "open_traverse",
+]

@@ -1,1 +1,33 @@
-"""placeholder"""
+"""Kernels: the few loops that take nearly all the time, compiled, with NumPy twins.
+
+Every function here runs compiled code where it was built, else NumPy with the same result.
+Contents: how kernels run (`backend`), regional matching (`regional`), regional HOG and local
+entropy (`encoding`), sequence scores along the diagonals of a similarity matrix (`diagonal`).
+"""
+
+from retraverse.kernels.backend import backend, default_threads, instruction_sets
+from retraverse.kernels.diagonal import (
+    BestDiagonals,
+    DiagonalSums,
+    best_diagonals,
+    best_diagonals_variable,
+    diagonal_scores,
+)
+from retraverse.kernels.encoding import local_entropy, region_entropies, regional_hog
+from retraverse.kernels.regional import quantise_regions, regional_scores
+
+__all__ = [
+    "BestDiagonals",
+    "DiagonalSums",
+    "backend",
+    "best_diagonals",
+    "best_diagonals_variable",
+    "default_threads",
+    "diagonal_scores",
+    "instruction_sets",
+    "local_entropy",
+    "quantise_regions",
+    "region_entropies",
+    "regional_hog",
+    "regional_scores",
+]

@@ -1,7 +1,27 @@
-"""Techniques: pictures in, descriptors out. One file each, one registry."""
+"""Techniques: pictures in, descriptors out. One file each, one registry.
 
-from retraverse.techniques.base import ArraySpec, Description, Descriptions, Layout, RegionalTechnique, Technique
-from retraverse.techniques.registry import ParameterInfo, TechniqueInfo, register, technique, techniques
+A new technique is one file in this room: a class with the members of `Technique`, a frozen
+dataclass of parameters, and `register` above it. Nothing else needs to know.
+"""
+
+import sys
+from types import ModuleType
+
+from retraverse.techniques.base import (
+    ArraySpec,
+    Description,
+    Descriptions,
+    Layout,
+    RegionalTechnique,
+    Technique,
+)
+from retraverse.techniques.registry import (
+    ParameterInfo,
+    TechniqueInfo,
+    register,
+    technique,
+    techniques,
+)
 
 __all__ = [
     "ArraySpec",
@@ -16,3 +36,16 @@ __all__ = [
     "technique",
     "techniques",
 ]
+
+
+class _CallableRoom(ModuleType):
+    """This room, callable: ``retraverse.techniques`` is both the room and the verb that lists it.
+
+    Importing the room puts the module where the package's top promises the function.
+    """
+
+    def __call__(self) -> list[TechniqueInfo]:
+        return techniques()
+
+
+sys.modules[__name__].__class__ = _CallableRoom

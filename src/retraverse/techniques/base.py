@@ -97,14 +97,14 @@ class Descriptions:
         arrays = {}
         for name, spec in layout.arrays.items():
             stacked = np.zeros((len(listed), *spec.shape), spec.dtype)
-            for row, description in zip(stacked, listed, strict=True):
+            for row, description in enumerate(listed):
                 value = description[name]
                 if value.shape != spec.shape or value.dtype != np.dtype(spec.dtype):
                     raise ShapeError(
                         f"array {name!r} of a description: got {value.dtype} {value.shape}, "
                         f"expected {spec.dtype} {spec.shape}"
                     )
-                row[...] = value
+                stacked[row] = value
             arrays[name] = stacked
         return cls(arrays)
 
@@ -113,7 +113,10 @@ class Descriptions:
         """Join descriptions end to end."""
         listed = list(parts)
         return cls(
-            {name: np.concatenate([part.arrays[name] for part in listed]) for name in listed[0].arrays}
+            {
+                name: np.concatenate([part.arrays[name] for part in listed])
+                for name in listed[0].arrays
+            }
         )
 
     def blocks(self, n_rows: int) -> Iterator["Descriptions"]:

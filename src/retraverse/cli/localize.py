@@ -1,0 +1,68 @@
+"""`retraverse localize`: a drive and a map in, one row of matches per frame out."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from retraverse.cli.options import (
+    Every,
+    JsonOutput,
+    SequenceLengthText,
+    SkipBad,
+    Threshold,
+    read_sequence_length,
+)
+from retraverse.cli.output import print_json, progress, remark
+from retraverse.images import open_traverse
+from retraverse.maps import load_map
+from retraverse.matching import match, save_matches
+
+__all__ = ["localize"]
+
+
+def localize(
+    route: Annotated[Path, typer.Argument(help="The route map.")],
+    query: Annotated[str, typer.Argument(help="The drive to locate: folder, glob or video.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="The matches, CSV.")] = Path(
+        "matches.csv"
+    ),
+    sequence_length: SequenceLengthText = "10",
+    threshold: Threshold = None,
+    every: Every = 1,
+    skip_bad: SkipBad = False,
+    json_output: JsonOutput = False,
+) -> None:
+    """Locate a drive on a map and write the matches as CSV."""
+    loaded = load_map(route)
+    show = progress()
+    traverse = open_traverse(query, every=every, skip_bad=skip_bad, progress=show)
+    for frame in traverse.skipped:
+        remark(f"left out {frame.name}: {frame.reason}")
+    matches = match(
+        traverse,
+        loaded,
+        sequence_length=read_sequence_length(sequence_length),
+        threshold=threshold,
+        progress=show,
+    )
+    save_matches(
+        matches,
+        out,
+        query_names=[frame.name for frame in traverse],
+        reference_names=loaded.frames.names,
+    )
+    counts = {
+        "matches": str(out),
+        "n_queries": matches.n_queries,
+        "n_answered": len(matches),
+        "n_refused": int((~matches.is_match).sum()),
+        "n_unanswered": matches.n_unanswered,
+    }
+    if json_output:
+        print_json(counts)
+    else:
+        print(
+            f"{counts['n_answered']} of {counts['n_queries']} frames answered "
+            f"({counts['n_refused']} with “no match”), {counts['n_unanswered']} not: {out}"
+        )

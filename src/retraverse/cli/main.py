@@ -1,0 +1,93 @@
+"""The command line: one file per verb; this one joins them and turns errors into exit codes.
+
+Exit codes: 0 done, 2 the input was wrong (one line on stderr says what), 1 our fault,
+130 stopped by Ctrl-C.
+"""
+
+import logging
+import sys
+
+import typer
+
+from retraverse._version import __version__
+from retraverse.cli import compare, datasets, demo, doctor, evaluate, listing, localize, maps
+from retraverse.errors import RetraverseError
+
+__all__ = ["VERBS", "app", "run"]
+
+VERBS = (
+    "demo",
+    "compare",
+    "map build",
+    "map info",
+    "map extend",
+    "localize",
+    "evaluate",
+    "techniques",
+    "datasets simulate",
+    "doctor",
+)
+"""Every verb, in the order a newcomer meets them."""
+
+app = typer.Typer(
+    name="retraverse",
+    help="Where on a known route a camera is now, although season, light and weather changed.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+app.command("demo")(demo.demo)
+app.command("compare")(compare.compare)
+app.add_typer(maps.app, name="map")
+app.command("localize")(localize.localize)
+app.command("evaluate")(evaluate.evaluate)
+app.command("techniques")(listing.techniques)
+app.add_typer(datasets.app, name="datasets")
+app.command("doctor")(doctor.doctor)
+
+
+@app.callback(invoke_without_command=True)
+def _version(
+    version: bool = typer.Option(False, "--version", help="Print the version and stop."),
+) -> None:
+    if version:
+        print(f"retraverse {__version__}")
+        raise typer.Exit
+
+
+def run() -> None:
+    """Run the command line and exit the process with the code that says how it went."""
+    logging.basicConfig(format="%(levelname)s: %(message)s", level=logging.WARNING)
+    try:
+        code = app(standalone_mode=False)
+    except typer.Abort:
+        code = _complain("stopped", 130)
+    except KeyboardInterrupt:
+        code = _complain("stopped", 130)
+    except BrokenPipeError:
+        # The reader of our output went away (`| head`): nothing more to say to it.
+        sys.stderr.close()
+        code = 0
+    except RetraverseError as error:
+        code = _complain(f"retraverse: {error}", 2)
+    except Exception as error:
+        code = _handle_other(error)
+    sys.exit(code or 0)
+
+
+def _handle_other(error: Exception) -> int:
+    """Return the exit code of a wrong option, a file that cannot be used, or a bug of ours."""
+    show, exit_code = getattr(error, "show", None), getattr(error, "exit_code", None)
+    if show is not None and isinstance(exit_code, int):
+        show()
+        return exit_code
+    if isinstance(error, OSError):
+        return _complain(f"retraverse: {error.strerror or error}: {error.filename or ''}", 2)
+    logging.getLogger("retraverse").exception("this is our fault, please report it")
+    return 1
+
+
+def _complain(message: str, code: int) -> int:
+    print(message, file=sys.stderr)
+    return code

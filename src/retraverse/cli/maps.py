@@ -1,0 +1,92 @@
+"""`retraverse map build | info | extend`: the earlier drive, described once and kept."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from retraverse.cli.options import (
+    Every,
+    JsonOutput,
+    Settings,
+    SkipBad,
+    TechniqueName,
+    make_technique,
+)
+from retraverse.cli.output import print_json, print_table, progress, remark
+from retraverse.images import Traverse, open_traverse
+from retraverse.maps import RouteMap, build_map, load_map
+
+__all__ = ["app"]
+
+app = typer.Typer(help="Build, describe and extend route maps.", no_args_is_help=True)
+
+MapPath = Annotated[Path, typer.Argument(help="A route map: a folder made by `map build`.")]
+Source = Annotated[str, typer.Argument(help="The drive: folder, glob or video.")]
+
+
+@app.command()
+def build(
+    source: Source,
+    out: Annotated[Path, typer.Option("--out", "-o", help="The map to write, a folder.")],
+    technique: TechniqueName = "convsequential",
+    settings: Settings = None,
+    thumbnails: Annotated[
+        int | None, typer.Option("--thumbnails", help="Keep pictures of this many pixels' width.")
+    ] = None,
+    positions: Annotated[
+        Path | None, typer.Option("--positions", help="CSV with a position in metres per frame.")
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a map there.")] = False,
+    every: Every = 1,
+    skip_bad: SkipBad = False,
+    json_output: JsonOutput = False,
+) -> None:
+    """Describe a drive and write it as a route map."""
+    from retraverse.datasets import load_positions
+
+    traverse = _open(source, every, skip_bad)
+    route = build_map(
+        traverse,
+        make_technique(technique, settings),
+        path=out,
+        thumbnails=thumbnails,
+        positions=None if positions is None else load_positions(positions)[traverse.indices],
+        overwrite=overwrite,
+        progress=progress(),
+    )
+    _print_info(route, json_output)
+
+
+@app.command()
+def info(path: MapPath, json_output: JsonOutput = False) -> None:
+    """Say what a map holds and how it was made."""
+    _print_info(load_map(path), json_output)
+
+
+@app.command()
+def extend(
+    path: MapPath,
+    source: Source,
+    every: Every = 1,
+    skip_bad: SkipBad = False,
+    json_output: JsonOutput = False,
+) -> None:
+    """Add the frames of a further drive to the end of a map."""
+    route = load_map(path).extend(_open(source, every, skip_bad), progress=progress())
+    _print_info(route, json_output)
+
+
+def _open(source: str, every: int, skip_bad: bool) -> Traverse:
+    traverse = open_traverse(source, every=every, skip_bad=skip_bad, progress=progress())
+    for frame in traverse.skipped:
+        remark(f"left out {frame.name}: {frame.reason}")
+    return traverse
+
+
+def _print_info(route: RouteMap, json_output: bool) -> None:
+    described = route.info()
+    if json_output:
+        print_json(described)
+    else:
+        print_table([[key, str(value)] for key, value in described.items()], head=("", ""))

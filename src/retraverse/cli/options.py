@@ -1,0 +1,141 @@
+"""Options that several verbs share, and how their text becomes values."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+
+from retraverse.datasets import GroundTruth, aligned, from_positions, ground_truth, load_positions
+from retraverse.errors import ConfigError, InputError
+from retraverse.images import Traverse
+from retraverse.techniques import Technique, technique
+
+__all__ = [
+    "Aligned",
+    "Every",
+    "JsonOutput",
+    "Radius",
+    "SequenceLengthText",
+    "Settings",
+    "SkipBad",
+    "TechniqueName",
+    "Threshold",
+    "TruthPath",
+    "make_technique",
+    "read_sequence_length",
+    "read_truth",
+]
+
+TechniqueName = Annotated[
+    str, typer.Option("--technique", "-t", help="One of `retraverse techniques`.")
+]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the technique; repeatable."),
+]
+SequenceLengthText = Annotated[
+    str,
+    typer.Option(
+        "--sequence-length", "-k", help="Frames in a window: 1, a whole number, or dynamic."
+    ),
+]
+Threshold = Annotated[
+    float | None,
+    typer.Option("--threshold", help="Answer “no match” where a window scores below this."),
+]
+Every = Annotated[int, typer.Option("--every", min=1, help="Take every N-th frame only.")]
+SkipBad = Annotated[
+    bool, typer.Option("--skip-bad", help="Leave out pictures that cannot be read, and say so.")
+]
+JsonOutput = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+TruthPath = Annotated[
+    Path | None,
+    typer.Option("--truth", help="Ground truth: JSON of query frame -> list of map frames."),
+]
+Aligned = Annotated[
+    int | None,
+    typer.Option("--aligned", min=0, metavar="FRAMES", help="Truth: same frame number, ± this."),
+]
+Radius = Annotated[
+    float | None,
+    typer.Option("--radius", metavar="METRES", help="Truth: positions.csv in both folders."),
+]
+
+
+def make_technique(name: str, settings: list[str] | None) -> Technique:
+    """Return the technique with ``name=value`` settings applied."""
+    values: dict[str, str] = {}
+    for setting in settings or []:
+        key, separator, value = setting.partition("=")
+        if not separator:
+            raise ConfigError(f"--set: got {setting!r}, expected NAME=VALUE")
+        values[key.strip()] = value.strip()
+    return technique(name, **values)
+
+
+def read_sequence_length(text: str) -> int | Literal["dynamic"]:
+    """Return "dynamic" or a whole number from 1."""
+    if text == "dynamic":
+        return "dynamic"
+    if not text.isascii() or not text.isdigit() or int(text) < 1:
+        raise ConfigError(
+            f"--sequence-length: got {text!r}, expected a whole number from 1, or dynamic"
+        )
+    return int(text)
+
+
+def read_truth(
+    truth: Path | None,
+    aligned_frames: int | None,
+    radius_m: float | None,
+    *,
+    query: Traverse,
+    reference: Traverse,
+    every: int = 1,
+) -> GroundTruth | None:
+    """Return the ground truth the options name, or None where they name none.
+
+    Frames left out by ``--skip-bad`` are left out of the truth too. ``--truth`` speaks of the
+    frame numbers of the source, ``--aligned`` of the frames that ``--every`` keeps.
+    """
+    options = {"--truth": truth, "--aligned": aligned_frames, "--radius": radius_m}
+    given = [name for name, value in options.items() if value is not None]
+    if len(given) > 1:
+        raise ConfigError(f"got {' and '.join(given)}, expected one of them: which is the truth?")
+    if truth is not None:
+        return ground_truth(truth).select(query.indices, reference.indices)
+    if aligned_frames is not None:
+        return _aligned(query, reference, aligned_frames, every)
+    if radius_m is not None:
+        return from_positions(
+            _positions_beside(query), _positions_beside(reference), radius_m=radius_m
+        )
+    return None
+
+
+def _aligned(query: Traverse, reference: Traverse, tolerance: int, every: int) -> GroundTruth:
+    kept_queries, kept_references = query.indices // every, reference.indices // every
+    whole = aligned(
+        int(kept_queries.max()) + 1, int(kept_references.max()) + 1, tolerance, every=every
+    )
+    return whole.select(kept_queries, kept_references)
+
+
+def _positions_beside(traverse: Traverse) -> NDArray[np.float64]:
+    """Return the positions of a traverse's frames from the table in its folder."""
+    path = traverse[0].path
+    table = None if path is None else path.parent / "positions.csv"
+    if table is None or not table.is_file():
+        raise InputError(
+            f"--radius: no positions.csv beside the pictures of {traverse.name}; expected a table "
+            "of metres, one row per picture"
+        )
+    positions = load_positions(table)
+    if len(positions) <= traverse.indices.max():
+        raise InputError(
+            f"--radius: {table} has {len(positions)} rows, expected at least "
+            f"{traverse.indices.max() + 1}, one per picture"
+        )
+    return positions[traverse.indices]

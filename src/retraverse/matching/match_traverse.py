@@ -1,0 +1,234 @@
+"""Matching a drive, or a ready similarity matrix, in windows of one length or of their own."""
+
+from typing import Literal
+
+import numpy as np
+
+from retraverse.errors import ConfigError, InputError, ShapeError
+from retraverse.images import Traverse
+from retraverse.maps import RouteMap
+from retraverse.matching.dynamic_length import GrowthRule, Window, dynamic_windows
+from retraverse.matching.matches import Matches
+from retraverse.matching.pairwise import describe_query, has_descriptor, similarity_blocks
+from retraverse.matching.windows import match_diagonals, match_first_roi
+from retraverse.techniques import Descriptions, RegionalTechnique
+from retraverse.techniques.convsequential import ConvSequentialParameters
+from retraverse.types import BoolArray, FloatArray, IntArray, Progress, no_progress
+
+__all__ = ["SequenceLength", "check_sequence_length", "match", "match_similarity", "query_windows"]
+
+SequenceLength = int | Literal["dynamic"]
+"""Frames in a window: 1 for single frames, K, or each window its own."""
+
+
+def match(
+    query: Traverse | Descriptions,
+    route: RouteMap,
+    *,
+    sequence_length: SequenceLength = 10,
+    matcher: str = "mean",
+    threshold: float | None = None,
+    progress: Progress = no_progress,
+) -> Matches:
+    """Return where each window of query frames lies on the map (algorithms 1 to 5).
+
+    Parameters
+    ----------
+    query : Traverse or Descriptions
+        The drive to locate, or its descriptions by the map's technique.
+    route : RouteMap
+        The map; its technique describes the query.
+    sequence_length : int or "dynamic"
+        1 matches single frames; K windows of K frames; ``"dynamic"`` lets every window find its
+        own length (sections 3.2.5 and 3.2.6), for techniques that offer it.
+    matcher : {"mean"}
+        How the pairs of a window become one score: their mean (equation 4.6).
+    threshold : float, optional
+        Windows that score below it are answered "no match" (reference -1).
+
+    Raises
+    ------
+    InputError
+        If a traverse is shorter than a window.
+    ConfigError
+        If the length is not offered by the technique, or the matcher is unknown.
+
+    Notes
+    -----
+    Static windows: N - K + 1 answers (equation 4.5). Dynamic windows stop when every frame has
+    been read, so the last frames get none. Windows whose frames gave no descriptor at all are
+    answered "no match". Peak memory is bounded by blocks: the (Q, R) matrix is never whole.
+    """
+    check_matcher(matcher)
+    queries = describe_query(query, route, progress=progress)
+    lengths = query_windows(queries, route, sequence_length)
+    technique = route.technique
+    if _takes_first_roi(route) and lengths.max(initial=1) > 1:
+        assert isinstance(technique, RegionalTechnique)
+        found = match_first_roi(technique, queries, route, lengths, progress=progress)
+    else:
+        found = match_diagonals(similarity_blocks(queries, route, progress=progress), lengths)
+    matches = _matches(*found, lengths, len(queries), len(route))
+    refused = matches.refuse(~_any_in_window(has_descriptor(queries), lengths))
+    return refused if threshold is None else refused.refuse_below(threshold)
+
+
+def match_similarity(
+    similarity: FloatArray,
+    *,
+    sequence_length: int = 10,
+    matcher: str = "mean",
+    threshold: float | None = None,
+) -> Matches:
+    """Return the same answers as `match` from a ready similarity matrix (algorithms 4 and 5).
+
+    Parameters
+    ----------
+    similarity : float array, shape (Q, R)
+        Rows are queries, columns references, higher is more alike; finite.
+    sequence_length : int
+        K: frames in a window.
+    matcher : {"mean"}
+        See `match`.
+    threshold : float, optional
+        Windows that score below it are answered "no match".
+
+    Raises
+    ------
+    ShapeError
+        If the matrix does not have two axes, or holds NaN or infinity.
+    InputError
+        If it has fewer rows or columns than K.
+    """
+    check_matcher(matcher)
+    scores = np.ascontiguousarray(similarity, dtype=np.float32)
+    if scores.ndim != 2:
+        raise ShapeError(f"similarity: got {scores.ndim} axes, expected 2: (queries, references)")
+    if not np.isfinite(scores).all():
+        row, column = np.argwhere(~np.isfinite(scores))[0]
+        raise ShapeError(
+            f"similarity: got {scores[row, column]} at query {row}, reference {column}; "
+            "expected finite numbers"
+        )
+    n_queries, n_references = scores.shape
+    lengths = _static_lengths(n_queries, n_references, sequence_length)
+    found = match_diagonals([(0, scores)], lengths)
+    matches = _matches(*found, lengths, n_queries, n_references)
+    return matches if threshold is None else matches.refuse_below(threshold)
+
+
+def query_windows(
+    queries: Descriptions, route: RouteMap, sequence_length: SequenceLength
+) -> IntArray:
+    """Return int64 (W,): the lengths of the windows that start at query 0, 1, ... W-1.
+
+    A dynamic window is never longer than the map.
+    """
+    check_sequence_length(sequence_length)
+    if sequence_length == "dynamic":
+        windows = _dynamic_windows(queries, route)
+        lengths = np.array([window.length for window in windows], np.int64)
+        return np.minimum(lengths, len(route))
+    return _static_lengths(len(queries), len(route), int(sequence_length))
+
+
+def check_sequence_length(sequence_length: object) -> None:
+    """Raise `ConfigError` unless it is a whole number from 1 or "dynamic"."""
+    whole = isinstance(sequence_length, (int, np.integer)) and not isinstance(sequence_length, bool)
+    if sequence_length != "dynamic" and not (whole and sequence_length >= 1):  # type: ignore[operator]
+        raise ConfigError(
+            f"sequence_length: got {sequence_length!r}, expected a whole number from 1 or 'dynamic'"
+        )
+
+
+def check_matcher(matcher: str) -> None:
+    """Raise `ConfigError` unless the matcher is known."""
+    if matcher != "mean":
+        raise ConfigError(f"unknown matcher: got {matcher!r}, expected 'mean'")
+
+
+def _static_lengths(n_queries: int, n_references: int, sequence_length: int) -> IntArray:
+    check_sequence_length(sequence_length)
+    for what, n_frames in (("query", n_queries), ("map", n_references)):
+        if n_frames < sequence_length:
+            raise InputError(
+                f"sequence_length {sequence_length}: the {what} has only {n_frames} frames; "
+                f"expected at least {sequence_length}, or a shorter sequence"
+            )
+    return np.full(n_queries - sequence_length + 1, sequence_length, np.int64)
+
+
+def _dynamic_windows(queries: Descriptions, route: RouteMap) -> list[Window]:
+    technique, parameters = route.technique, route.technique.parameters
+    if not isinstance(parameters, ConvSequentialParameters):
+        raise ConfigError(
+            f"sequence_length 'dynamic': {technique.name} does not offer it; expected a whole "
+            "number, or the technique convsequential"
+        )
+    assert isinstance(technique, RegionalTechnique)
+    rule = GrowthRule(
+        sequence_entropy=parameters.sequence_entropy,
+        information_threshold=parameters.information_threshold,
+        min_length=parameters.min_sequence_length,
+        max_overlap_length=parameters.max_overlap_length,
+        max_length=parameters.max_sequence_length,
+    )
+    overlap = Overlap(technique, queries)
+    return dynamic_windows(queries.arrays["entropy"], overlap, rule)
+
+
+class Overlap:
+    """Similarity of a frame with the ones after it, under its own region of interest.
+
+    Computed `AHEAD` frames at a time, since windows ask for one frame after the other.
+    """
+
+    AHEAD = 6
+
+    def __init__(self, technique: RegionalTechnique, queries: Descriptions) -> None:
+        self._technique = technique
+        self._queries = queries
+        self._weights = technique.region_weights(queries)
+        self._first = -1
+        self._scores: list[float] = []
+
+    def __call__(self, first: int, later: int) -> float:
+        if first != self._first:
+            self._first, self._scores = first, []
+        while later - first > len(self._scores):
+            start = first + 1 + len(self._scores)
+            scores = self._technique.weighted_similarity(
+                self._queries.descriptor[first],
+                self._queries.descriptor[start : start + self.AHEAD],
+                self._weights[first : first + 1],
+            )
+            self._scores.extend(scores[0].tolist())
+        return self._scores[later - first - 1]
+
+
+def _takes_first_roi(route: RouteMap) -> bool:
+    return getattr(route.technique.parameters, "roi", "each") == "first"
+
+
+def _any_in_window(frames: BoolArray, lengths: IntArray) -> BoolArray:
+    """Return bool (W,): True where any frame of the window is True."""
+    counts = np.concatenate([[0], np.cumsum(frames)])
+    starts = np.arange(len(lengths))
+    return np.asarray(counts[starts + lengths] > counts[starts])
+
+
+def _matches(
+    reference: IntArray,
+    score: FloatArray,
+    lengths: IntArray,
+    n_queries: int,
+    n_references: int,
+) -> Matches:
+    return Matches(
+        query=np.arange(len(lengths)),
+        reference=reference,
+        score=score,
+        sequence_length=lengths,
+        n_queries=n_queries,
+        n_references=n_references,
+    )

@@ -1,0 +1,172 @@
+"""Figures as small inline SVG: one style, one palette, the same bytes every time.
+
+Colours are drawn as fixed values and then exchanged for CSS variables, so that a figure
+follows the page it stands in (light, dark, print). Text stays text.
+"""
+
+import base64
+import io
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from markupsafe import Markup, escape
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["COLOURS", "MANY_POINTS", "Plot", "Span", "drawing", "export", "panel"]
+
+COLOURS = {
+    "ink": "#1b2431",
+    "muted": "#5a6573",
+    "grid": "#dde3ea",
+    "surface": "#fefefe",
+    "correct": "#0072b3",
+    "wrong": "#d55e01",
+    "truth": "#009e74",
+}
+"""CSS variable -> the value drawn in its place; safe for the usual colour blindnesses."""
+
+MANY_POINTS = 1500
+"""From here on, marks are drawn as one picture instead of one shape each."""
+
+_STYLE: dict[str, object] = {
+    "svg.fonttype": "none",
+    "font.family": "DejaVu Sans",
+    "font.size": 11,
+    "text.color": COLOURS["ink"],
+    "text.parse_math": False,
+    "axes.edgecolor": COLOURS["muted"],
+    "axes.labelcolor": COLOURS["ink"],
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.facecolor": "none",
+    "axes.axisbelow": True,
+    "axes.labelpad": 5,
+    "grid.color": COLOURS["grid"],
+    "grid.linewidth": 0.8,
+    "xtick.color": COLOURS["muted"],
+    "ytick.color": COLOURS["muted"],
+    "xtick.labelcolor": COLOURS["muted"],
+    "ytick.labelcolor": COLOURS["muted"],
+    "figure.facecolor": "none",
+    "savefig.facecolor": "none",
+    "image.composite_image": False,
+    "hatch.linewidth": 0.6,
+}
+
+
+@dataclass(frozen=True)
+class Span:
+    """Where one panel's data lie in its figure, for marks that the page lays over it."""
+
+    left: float
+    """Left edge of the panel, fraction of the figure's width."""
+    top: float
+    """Upper edge, fraction of the figure's height."""
+    width: float
+    height: float
+    x: tuple[float, float]
+    """Data values at the left and right edge."""
+    y: tuple[float, float]
+    """Data values at the upper and lower edge."""
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A figure ready for a page."""
+
+    svg: Markup
+    alt: str
+    """What it shows, for those who cannot see it."""
+    span: Span
+
+
+@contextmanager
+def drawing(name: str) -> Iterator[None]:
+    """Draw in the report's style while the block lasts; `name` keeps figures' marks apart."""
+    from matplotlib import style
+
+    with style.context(["default", {**_STYLE, "svg.hashsalt": f"retraverse-{name}"}]):
+        yield
+
+
+def panel(
+    width: float, height: float, *, left: float = 48, right: float = 12, bottom: float = 44
+) -> "tuple[Figure, Axes]":
+    """Return a figure of `width` x `height` SVG units and its one panel inside the margins."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width / 72, height / 72))
+    top = 8
+    axes = figure.add_axes(
+        (
+            left / width,
+            bottom / height,
+            (width - left - right) / width,
+            (height - top - bottom) / height,
+        )
+    )
+    return figure, axes
+
+
+def export(figure: "Figure", axes: "Axes", alt: str) -> Plot:
+    """Return `figure` as inline SVG with `alt` as its accessible name."""
+    buffer = io.StringIO()
+    nothing = {"Date": None, "Creator": None, "Format": None, "Type": None}
+    figure.savefig(buffer, format="svg", metadata=nothing, dpi=144)
+    return Plot(Markup(_inline(buffer.getvalue(), alt)), alt, _span(axes))
+
+
+def _span(axes: "Axes") -> Span:
+    box = axes.get_position()
+    bottom, top = axes.get_ylim()
+    return Span(box.x0, 1 - box.y1, box.width, box.height, axes.get_xlim(), (top, bottom))
+
+
+def _inline(text: str, alt: str) -> str:
+    text = text[text.index("<svg") :].strip()
+    text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, count=1, flags=re.DOTALL)
+    box = re.search(r'viewBox="[^"]*"', text)
+    head = f'<svg xmlns:xlink="http://www.w3.org/1999/xlink" {box[0] if box else ""}'
+    text = re.sub(r"<svg[^>]*>", f'{head} role="img" aria-label="{escape(alt)}">', text, count=1)
+    text = re.sub(r"data:image/png;base64,([A-Za-z0-9+/=\s]+)", _lean_png, _without_idle_ids(text))
+    for name, value in COLOURS.items():
+        text = text.replace(value, f"var(--{name})")
+    return re.sub(r"\n\s*", "\n", text)
+
+
+def _lean_png(match: re.Match[str]) -> str:
+    """Return a PNG of few colours as one with a palette: the same pixels in fewer bytes."""
+    from PIL import Image
+
+    with Image.open(io.BytesIO(base64.b64decode(match[1]))) as image:
+        pixels = np.asarray(image.convert("RGBA"))
+    packed = np.ascontiguousarray(pixels).view(np.uint32)[..., 0]
+    colours, indices = np.unique(packed, return_inverse=True)
+    if len(colours) > 256:
+        return match[0]
+    lean = Image.fromarray(indices.reshape(packed.shape).astype(np.uint8), "P")
+    channels = colours.view(np.uint8).reshape(-1, 4)
+    lean.putpalette(channels[:, :3].tobytes())
+    buffer = io.BytesIO()
+    lean.save(buffer, "PNG", optimize=True, transparency=channels[:, 3].tobytes())
+    return f"data:image/png;base64,{base64.b64encode(buffer.getvalue()).decode()}"
+
+
+def _without_idle_ids(text: str) -> str:
+    """Drop ids that nothing refers to; an id "layer-x" becomes a class."""
+    used = set(re.findall(r'(?:url\(#|href="#)([^")]+)', text))
+
+    def keep(match: re.Match[str]) -> str:
+        if match[1].startswith("layer-"):
+            return f' class="{match[1]}"'
+        return match[0] if match[1] in used else ""
+
+    return re.sub(r' id="([^"]+)"', keep, text)

@@ -1,0 +1,26 @@
+"""Helpers for the parameter dataclasses: a default with its help line, and range checks."""
+
+from dataclasses import field
+from typing import Any
+
+from retraverse.errors import ConfigError
+
+__all__ = ["check_multiple", "check_range", "parameter"]
+
+
+def parameter(default: Any, help: str) -> Any:
+    """Return a dataclass field with a default and the line that lists show."""
+    return field(default=default, metadata={"help": help})
+
+
+def check_range(name: str, value: float, low: float, high: float, why: str = "") -> None:
+    """Raise `ConfigError` unless ``low <= value <= high``; `why` explains the bound."""
+    if not low <= value <= high:
+        raise ConfigError(f"{name}: got {value:g}, expected {low:g} to {high:g}{why}")
+
+
+def check_multiple(name: str, value: int, base: int, low: int, high: int) -> None:
+    """Raise `ConfigError` unless `value` is a multiple of `base` between `low` and `high`."""
+    check_range(name, value, low, high)
+    if value % base:
+        raise ConfigError(f"{name}: got {value}, expected a multiple of {base}")
