@@ -34,8 +34,8 @@ def localize(
     json_output: JsonOutput = False,
 ) -> None:
     """Locate a drive on a map and write the matches as CSV."""
-    loaded = load_map(route)
     show = progress()
+    loaded = load_map(route, progress=show)
     traverse = open_traverse(query, every=every, skip_bad=skip_bad, progress=show)
     for frame in traverse.skipped:
         remark(f"left out {frame.name}: {frame.reason}")

@@ -3,7 +3,9 @@
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
+from numpy.typing import NDArray
 
 from retraverse.cli.options import (
     Every,
@@ -14,6 +16,8 @@ from retraverse.cli.options import (
     make_technique,
 )
 from retraverse.cli.output import print_json, print_table, progress, remark
+from retraverse.datasets import load_positions
+from retraverse.errors import InputError
 from retraverse.images import Traverse, open_traverse
 from retraverse.maps import RouteMap, build_map, load_map
 
@@ -23,6 +27,9 @@ app = typer.Typer(help="Build, describe and extend route maps.", no_args_is_help
 
 MapPath = Annotated[Path, typer.Argument(help="A route map: a folder made by `map build`.")]
 Source = Annotated[str, typer.Argument(help="The drive: folder, glob or video.")]
+Positions = Annotated[
+    Path | None, typer.Option("--positions", help="CSV with a position in metres per frame.")
+]
 
 
 @app.command()
@@ -32,26 +39,23 @@ def build(
     technique: TechniqueName = "convsequential",
     settings: Settings = None,
     thumbnails: Annotated[
-        int | None, typer.Option("--thumbnails", help="Keep pictures of this many pixels' width.")
+        int | None,
+        typer.Option("--thumbnails", help="Keep pictures, longest side this many pixels."),
     ] = None,
-    positions: Annotated[
-        Path | None, typer.Option("--positions", help="CSV with a position in metres per frame.")
-    ] = None,
+    positions: Positions = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a map there.")] = False,
     every: Every = 1,
     skip_bad: SkipBad = False,
     json_output: JsonOutput = False,
 ) -> None:
     """Describe a drive and write it as a route map."""
-    from retraverse.datasets import load_positions
-
     traverse = _open(source, every, skip_bad)
     route = build_map(
         traverse,
         make_technique(technique, settings),
         path=out,
         thumbnails=thumbnails,
-        positions=None if positions is None else load_positions(positions)[traverse.indices],
+        positions=_positions_of(traverse, positions),
         overwrite=overwrite,
         progress=progress(),
     )
@@ -61,19 +65,22 @@ def build(
 @app.command()
 def info(path: MapPath, json_output: JsonOutput = False) -> None:
     """Say what a map holds and how it was made."""
-    _print_info(load_map(path), json_output)
+    _print_info(load_map(path, progress=progress()), json_output)
 
 
 @app.command()
 def extend(
     path: MapPath,
     source: Source,
+    positions: Positions = None,
     every: Every = 1,
     skip_bad: SkipBad = False,
     json_output: JsonOutput = False,
 ) -> None:
     """Add the frames of a further drive to the end of a map."""
-    route = load_map(path).extend(_open(source, every, skip_bad), progress=progress())
+    route = load_map(path, progress=progress())
+    traverse = _open(source, every, skip_bad)
+    route.extend(traverse, positions=_positions_of(traverse, positions), progress=progress())
     _print_info(route, json_output)
 
 
@@ -82,6 +89,19 @@ def _open(source: str, every: int, skip_bad: bool) -> Traverse:
     for frame in traverse.skipped:
         remark(f"left out {frame.name}: {frame.reason}")
     return traverse
+
+
+def _positions_of(traverse: Traverse, table: Path | None) -> NDArray[np.float64] | None:
+    """Return the positions of the frames that were read, from a table of the whole drive."""
+    if table is None:
+        return None
+    positions = load_positions(table)
+    if len(positions) <= traverse.indices.max():
+        raise InputError(
+            f"--positions: {table} has {len(positions)} rows, expected one per picture "
+            f"({traverse.indices.max() + 1} or more)"
+        )
+    return positions[traverse.indices]
 
 
 def _print_info(route: RouteMap, json_output: bool) -> None:

@@ -131,15 +131,15 @@ def _read_value(technique_name: str, key: str, value: Any, hint: Any) -> Any:
             if value == choice or str(value) == str(choice):
                 return choice
         raise ConfigError(f"{what}, expected one of {', '.join(map(repr, choices))}")
-    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
+    if isinstance(value, bool) or not isinstance(value, str | int | float):
         raise ConfigError(f"{what}, expected {hint.__name__}")
     try:
-        number = hint(value)
+        number = float(value)
     except ValueError as error:
         raise ConfigError(f"{what}, expected {hint.__name__}") from error
-    if number != float(value):
+    if hint is int and not number.is_integer():
         raise ConfigError(f"{what}, expected a whole number")
-    return number
+    return hint(number)
 
 
 def _unknown(what: str, got: str, known: list[str]) -> str:

@@ -109,8 +109,8 @@ def make_look(disturbances: Disturbances) -> Look:
     overcast = 1.0 - (1.0 - 0.8 * smooth_step(0.35, 1.0, d.season)) * (1.0 - d.rain) * (
         1.0 - 0.9 * d.fog
     )
-    sun_colour = blend(_rgb(0.60, 0.54, 0.44), _rgb(0.75, 0.42, 0.20), min(1.0, 2 * d.night))
-    ambient = blend(_rgb(0.48, 0.51, 0.57), _rgb(0.74, 0.76, 0.79), overcast)
+    sun_colour = blend(_rgb(0.62, 0.55, 0.43), _rgb(0.75, 0.42, 0.20), min(1.0, 2 * d.night))
+    ambient = blend(_rgb(0.60, 0.62, 0.67), _rgb(0.84, 0.86, 0.89), overcast)
     ambient = ambient * np.float32(day * (1.0 - 0.18 * d.rain))
     zenith, horizon = _sky_colours(d.night, overcast)
     return Look(
@@ -133,8 +133,8 @@ def make_look(disturbances: Disturbances) -> Look:
 
 def _sky_colours(night: float, overcast: float) -> tuple[FloatArray, FloatArray]:
     """Return the colours of the sky overhead and at the horizon."""
-    zenith = blend(_rgb(84, 132, 196), _rgb(168, 175, 184), overcast)
-    horizon = blend(_rgb(198, 214, 228), _rgb(206, 209, 213), overcast)
+    zenith = blend(_rgb(112, 160, 214), _rgb(184, 190, 198), overcast)
+    horizon = blend(_rgb(214, 226, 236), _rgb(218, 221, 225), overcast)
     dusk_low = blend(_rgb(206, 138, 100), _rgb(112, 110, 118), overcast)
     return (
         _through_night(zenith, _rgb(62, 74, 112), _rgb(9, 11, 21), night),

@@ -5,14 +5,14 @@ from functools import lru_cache
 
 import numpy as np
 
-from retraverse.datasets.simulated.camera import NEAR_M, Points, View
+from retraverse.datasets.simulated.camera import NEAR_M, Points
 from retraverse.datasets.simulated.canvas import Canvas, Texture
 from retraverse.datasets.simulated.conditions import Look
 from retraverse.datasets.simulated.lighting import wall_light
+from retraverse.datasets.simulated.scene import Seen
 from retraverse.datasets.simulated.street import Street
 from retraverse.datasets.simulated.things import Building
 from retraverse.datasets.simulated.walls import paint_end_wall, paint_front, paint_roof
-from retraverse.types import FloatArray
 
 __all__ = ["HousePainter"]
 
@@ -53,13 +53,14 @@ class HousePainter:
         light = wall_light(self.street, self.look, building, "roof")
         return paint_roof(building, self.look, light, slope_m)
 
-    def draw(self, canvas: Canvas, building: Building) -> None:
+    def draw(self, canvas: Canvas, building: Building, seen: Seen) -> None:
         """Draw what can be seen of a house."""
-        plan = self._corners(canvas.view, building)
+        start, end, rear = seen.anchors
+        plan = _Corners(start, end - start, rear - start)
         if max(plan.start[2], (plan.start + plan.along)[2]) < NEAR_M:
             return
         eaves = UP * building.eaves_m
-        if plan.start @ plan.along > 0:
+        if plan.start @ plan.along > 0 and not seen.hides_end:
             top = UP * (building.eaves_m + (building.roof_m if building.roof == "ridge" else 0.0))
             canvas.panel(self._end(building), plan.start + top, plan.back, -top)
         if building.roof != "flat":
@@ -67,16 +68,6 @@ class HousePainter:
         if plan.start @ plan.back > 0:
             top = UP * (building.eaves_m + (building.roof_m if building.roof == "gable" else 0.0))
             canvas.panel(self._front(building), plan.start + top, plan.along, -top)
-
-    def _corners(self, view: View, building: Building) -> _Corners:
-        """Return the ground plan: straight walls between points on the curved street."""
-        s = np.array([building.start_m, building.end_m])
-        start, end = self.street.line.points(s, building.side * building.front_m)
-        along = end - start
-        outwards = np.array([along[1], -along[0], 0.0]) * building.side
-        rear = start + outwards * (building.depth_m / np.linalg.norm(along))
-        points = view.to_camera(np.stack([start, end, rear]))
-        return _Corners(points[0], points[1] - points[0], points[2] - points[0])
 
     def _draw_roof(
         self, canvas: Canvas, building: Building, plan: _Corners, eaves: Points
@@ -114,21 +105,22 @@ class HousePainter:
     ) -> None:
         """Draw one or two chimneys on the ridge, with snow caps."""
         width = 0.7 / float(np.linalg.norm(across))
-        brick = np.array([128, 82, 68], np.float32) * (self.look.ambient + self.look.sun * 0.3)
+        light = self.look.ambient + self.look.sun * np.float32(0.3)
+        brick = np.array([128, 82, 68], np.float32) * light
+        cap = np.array([232, 236, 242] if self.look.snow > 0.4 else [92, 84, 80], np.float32)
+        colours = np.stack([brick, brick * np.float32(0.75), cap * light])
         for k in range(1 + building.seed % 2):
             at = ridge + across * (0.12 + 0.7 * (building.seed // 7 % 5 / 5 + 0.41 * k) % 0.86)
             side, tall = across * width, UP * (1.3 + building.seed % 3 * 0.25)
-            foot = at - UP * 0.4
-            self._quad(canvas, foot, side, tall, brick)
-            out = np.array([side[2], 0.0, -side[0]]) * (0.8 * np.sign(at @ [side[2], 0.0, -side[0]]))
-            self._quad(canvas, foot, out, tall, brick * np.float32(0.75))
-            cap = np.array([232, 236, 242] if self.look.snow > 0.4 else [92, 84, 80], np.float32)
-            self._quad(canvas, foot + tall, side, UP * 0.14, cap * self.look.ambient)
+            foot, top = at - UP * 0.4, at - UP * 0.4 + tall
+            out = np.array([side[2], 0.0, -side[0]])
+            out *= 0.8 * np.sign(at @ out)
+            corners = [_quad(foot, side, tall), _quad(foot, out, tall), _quad(top, side, UP * 0.14)]
+            canvas.faces(np.concatenate(corners), [4, 4, 4], colours)
 
-    def _quad(
-        self, canvas: Canvas, corner: Points, across: Points, up: Points, colour: FloatArray
-    ) -> None:
-        canvas.polygon(np.stack([corner, corner + across, corner + across + up, corner + up]), colour)
+
+def _quad(corner: Points, across: Points, up: Points) -> Points:
+    return np.array([corner, corner + across, corner + across + up, corner + up])
 
 
 def _faces_camera(corner: Points, across: Points, down: Points) -> bool:

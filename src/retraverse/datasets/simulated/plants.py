@@ -17,7 +17,7 @@ from retraverse.types import FloatArray, ImageArray
 
 __all__ = ["SPRITE_ASPECT", "paint_barrier", "paint_tree"]
 
-ROWS, COLUMNS = 288, 256
+ROWS, COLUMNS = 432, 384
 SPRITE_ASPECT = COLUMNS / ROWS
 """Width of a tree's texture as a part of its height."""
 
@@ -99,7 +99,7 @@ def _fitted(twigs: list[_Twig]) -> list[_Twig]:
         x = COLUMNS / 2 + (point[0] - COLUMNS / 2) * min(wide, 1.5 * high)
         return x, ROWS - (ROWS - point[1]) * high
 
-    return [_Twig(moved(t.start), moved(t.end), t.width, t.depth) for t in twigs]
+    return [_Twig(moved(t.start), moved(t.end), t.width * 1.2, t.depth) for t in twigs]
 
 
 def _draw_wood(colours: ImageArray, alpha: ImageArray, twigs: list[_Twig], look: Look) -> None:
@@ -128,9 +128,10 @@ def _draw_leaves(
 ) -> None:  # fmt: skip
     """Draw the leaves that are left: dark ones first, those in the light last."""
     tips = np.array([twig.end for twig in twigs if twig.depth >= 3])
-    count = len(tips) * 3
-    places = np.repeat(tips, 3, axis=0) + rng.normal(0, 7.5, (count, 2))
-    sizes, order = rng.uniform(4.0, 8.5, count), rng.random(count)
+    tufts = max(3, 1500 // len(tips))
+    count = len(tips) * tufts
+    places = np.repeat(tips, tufts, axis=0) + rng.normal(0, 14.0, (count, 2))
+    sizes, order = rng.uniform(3.5, 9.0, count), rng.random(count)
     own, tint = rng.normal(0, 0.1, count), rng.integers(4)
     left = order < look.leaves
     centre, extent = tips.mean(axis=0), tips.std(axis=0) + 1
@@ -164,28 +165,28 @@ def _conifer(
     import cv2
 
     middle = COLUMNS // 2
-    cv2.rectangle(colours, (middle - 5, ROWS - 30), (middle + 5, ROWS), (74, 60, 50), -1)
-    cv2.rectangle(alpha, (middle - 5, ROWS - 30), (middle + 5, ROWS), 255, -1)
+    cv2.rectangle(colours, (middle - 7, ROWS - 44), (middle + 7, ROWS), (74, 60, 50), -1)
+    cv2.rectangle(alpha, (middle - 7, ROWS - 44), (middle + 7, ROWS), 255, -1)
     green = np.array([40, 70, 46], np.float32) * np.float32(rng.uniform(0.85, 1.25))
-    reach = float(rng.uniform(58, 88))
-    for row in range(ROWS - 24, 10, -7):
+    reach = float(rng.uniform(84, 128))
+    for row in range(ROWS - 36, 14, -8):
         half = reach * (row / ROWS) ** 1.1 * float(rng.uniform(0.8, 1.1))
-        for x in np.linspace(-half, half, max(2, int(half / 4))):
+        for x in np.linspace(-half, half, max(2, int(half / 4.5))):
             drop = 0.22 * abs(x) + float(rng.normal(0, 2))
             shade = 0.85 - 0.3 * x / reach * 0.5 + float(rng.normal(0, 0.14))
             is_white = rng.random() < look.snow * 0.72
             tuft = SNOW * np.float32(0.93) if is_white else green * np.float32(max(shade, 0.3))
-            _blob(colours, alpha, np.array([middle + x, row + drop]), 6.5, tuft)
+            _blob(colours, alpha, np.array([middle + x, row + drop]), 8.0, tuft)
 
 
 def _bush(colours: ImageArray, alpha: ImageArray, rng: np.random.Generator, look: Look) -> None:
     """Draw a round bush; it thins to twigs in winter, with snow on top."""
     import cv2
 
-    base, count = (COLUMNS // 2, ROWS - 1), 320
+    base, count = (COLUMNS // 2, ROWS - 1), 520
     angles, radii = rng.uniform(-1.45, 1.45, count), np.sqrt(rng.random(count))
     places = np.stack(
-        [base[0] + np.sin(angles) * radii * 108, base[1] - np.cos(angles) * radii * 250], axis=1
+        [base[0] + np.sin(angles) * radii * 165, base[1] - np.cos(angles) * radii * 380], axis=1
     )
     for place in places[::5]:
         end = (round(float(place[0])), round(float(place[1])))
@@ -198,7 +199,7 @@ def _bush(colours: ImageArray, alpha: ImageArray, rng: np.random.Generator, look
     light = 0.6 + 0.5 * radii * np.cos(angles) - 0.08 * np.sin(angles) + rng.normal(0, 0.1, count)
     for k in np.argsort(light):
         if is_evergreen or order[k] < look.leaves:
-            _blob(colours, alpha, places[k], 12.0, leaf * np.float32(np.clip(light[k], 0.35, 1.4)))
+            _blob(colours, alpha, places[k], 13.0, leaf * np.float32(np.clip(light[k], 0.35, 1.4)))
         elif light[k] > 0.95 and order[k] < look.snow:
             _blob(colours, alpha, places[k], 11.0, SNOW * np.float32(0.9))
     if is_evergreen and look.snow > 0:

@@ -103,26 +103,44 @@ def _light_far_windows(
     sky[np.clip(rows, 0, ROWS - 1), columns] += warm
 
 
+PAD = 40
+"""Rows repeated above and below a panorama, for pitch."""
+
+
 class SkyWindow:
-    """Cuts a camera's part out of a panorama."""
+    """Cuts a camera's part out of a panorama, to the nearest sixth of a degree."""
 
     def __init__(self, camera: Camera) -> None:
+        import cv2
+
         height, width = camera.canvas
         self.rows = min(height, round(height * camera.horizon + 0.06 * camera.focal))
         dx = (np.arange(width, dtype=np.float32) + 0.5 - width / 2)[None]
         dy = height * camera.horizon - (np.arange(self.rows, dtype=np.float32) + 0.5)[:, None]
         azimuth = -np.arctan(dx / camera.focal)
         elevation = np.arctan(dy / np.hypot(dx, camera.focal))
-        self._columns = np.broadcast_to(azimuth, elevation.shape) * (COLUMNS / (2 * np.pi))
-        self._elevation = (HIGH - elevation) * ((ROWS - 1) / (HIGH - LOW))
+        columns = np.broadcast_to(azimuth * (COLUMNS / (2 * np.pi)), elevation.shape)
+        rows = (HIGH - elevation) * ((ROWS - 1) / (HIGH - LOW)) + PAD
+        self._left = math.floor(columns.min())
+        self._width = math.ceil(columns.max()) - self._left + 2
+        self._maps = cv2.convertMaps(
+            (columns - self._left).astype(np.float32), rows.astype(np.float32), cv2.CV_16SC2
+        )
 
-    def cut(self, panorama: ImageArray, heading: float, pitch: float) -> ImageArray:
+    def padded(self, panorama: ImageArray) -> ImageArray:
+        """Return a panorama with its edges repeated, so that any window is one slice of it."""
+        turns = np.arange(-self._width, COLUMNS + self._width) % COLUMNS
+        rows = np.clip(np.arange(-2 * PAD, ROWS + 2 * PAD), 0, ROWS - 1)
+        return np.ascontiguousarray(panorama[rows][:, turns])
+
+    def cut(self, padded: ImageArray, heading: float, pitch: float) -> ImageArray:
         """Return the sky for a heading (radians), from the top row to just below the horizon."""
         import cv2
 
-        columns = (self._columns + heading * COLUMNS / (2 * np.pi)) % COLUMNS
-        rows = self._elevation + pitch * (ROWS - 1) / (HIGH - LOW)
-        return np.asarray(cv2.remap(
-            panorama, columns.astype(np.float32), np.clip(rows, 0, ROWS - 1).astype(np.float32),
-            cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP,
-        ))  # fmt: skip
+        left = round(heading * COLUMNS / (2 * np.pi)) + self._left
+        left = left % COLUMNS + self._width
+        # A pitch upwards moves the horizon down: the same row then shows a higher place.
+        up = min(max(round(pitch * (ROWS - 1) / (HIGH - LOW)), -PAD), PAD)
+        window = padded[PAD - up : ROWS + 3 * PAD - up, left : left + self._width]
+        return np.asarray(cv2.remap(window, *self._maps, cv2.INTER_LINEAR,
+                                    borderMode=cv2.BORDER_REPLICATE))  # fmt: skip

@@ -8,6 +8,7 @@ as much traffic at the end of a long route as at its start.
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -52,6 +53,8 @@ class Traffic:
     def __init__(self, amount: float, seed: int, positions_m: Metres, frame_s: float) -> None:
         self.amount, self.seed = amount, seed
         self._positions, self._frame_s = positions_m, frame_s
+        self._frames = np.arange(len(positions_m), dtype=float)
+        self.parked_body = lru_cache(maxsize=4096)(self._parked_body)
 
     def movers(self, frame: int) -> list[Mover]:
         """Return everything that moves near the camera at a frame."""
@@ -61,7 +64,7 @@ class Traffic:
         here = float(self._positions[frame])
         return [*self._oncoming(now, here), *self._leader(now, here), *self._walkers(now, here)]
 
-    def parked_body(self, car: ParkedCar) -> int | None:
+    def _parked_body(self, car: ParkedCar) -> int | None:
         """Return the seed of the vehicle at a kerbside place, or None if it is empty."""
         rng = np.random.default_rng([self.seed, 80, car.seed])
         if rng.random() >= 0.6 * self.amount:
@@ -69,8 +72,7 @@ class Traffic:
         return int(rng.integers(2**31)) if rng.random() < 0.5 else None
 
     def _camera_at(self, time: float) -> float:
-        last = len(self._positions) - 1
-        return float(np.interp(time / self._frame_s, [0, *range(1, last + 1)], self._positions))
+        return float(np.interp(time / self._frame_s, self._frames, self._positions))
 
     def _oncoming(self, now: float, here: float) -> Iterator[Mover]:
         for k in range(math.floor(now / ONCOMING_S) - 4, math.floor(now / ONCOMING_S) + 9):

@@ -1,0 +1,81 @@
+"""Print accuracy and AUC of every technique on the real drives that are here, as a table.
+
+Run: .venv/bin/python benchmarks/real_sets.py [DATA_FOLDER]
+Tolerance ±2 frames; nordland_64x32 is thinned to every 20th file, winter queries on the summer
+map, ±1 (±20 original files). gardens_point_thumbnails are 97x54 pictures cut from result sheets:
+numbers on it are thumbnail numbers, never the published set's. Intervals: 95 %, bootstrap over
+windows, seed 0.
+"""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import retraverse as rt
+from retraverse.matching import describe_query
+
+SETS: dict[str, tuple[str, str, int, int]] = {
+    "corridor": ("reference", "query", 1, 2),
+    "stromovka": ("autumn", "snow", 1, 2),
+    "gardens_point_thumbnails": ("reference", "query", 1, 2),
+    "nordland_64x32": ("summer", "winter", 20, 1),
+}
+RUNS: list[tuple[str, dict[str, Any], list[int | str]]] = [
+    ("hog", {"form": "vprbench"}, [1, 10]),
+    ("hog", {"form": "chapter6"}, [1, 10]),
+    ("hog", {"form": "chapter7"}, [1, 10]),
+    ("cohog", {}, [1, 10]),
+    ("convsequential", {"roi": "first"}, [10, "dynamic"]),
+    ("convsequential", {"roi": "each"}, [10, "dynamic"]),
+    ("convsequential", {"roi": "first", "precision": "int8"}, [10, "dynamic"]),
+]
+
+
+def main() -> None:
+    data = Path(sys.argv[1] if len(sys.argv) > 1 else "../shared/data")
+    for name, (reference_folder, query_folder, every, tolerance) in SETS.items():
+        if not (data / name).is_dir():
+            print(f"\n{name}: not here")
+            continue
+        reference = rt.open_traverse(data / name / reference_folder, every=every)
+        query = rt.open_traverse(data / name / query_folder, every=every)
+        truth = rt.aligned(len(query), len(reference), tolerance, every=every)
+        print(f"\n**{name}**: {len(query)} queries, {len(reference)} references, "
+              f"{truth.description}\n")  # fmt: skip
+        print(
+            "| technique | parameters | K | answered | accuracy | 95 % | of all | AUC | AUC single |"
+        )
+        print("|---|---|---|---|---|---|---|---|---|")
+        for technique_name, parameters, lengths in RUNS:
+            print_rows(query, reference, truth, technique_name, parameters, lengths)
+
+
+def print_rows(
+    query: rt.Traverse,
+    reference: rt.Traverse,
+    truth: rt.GroundTruth,
+    technique_name: str,
+    parameters: dict[str, Any],
+    lengths: list[int | str],
+) -> None:
+    """Print one row for each sequence length of one technique."""
+    route = rt.build_map(reference, rt.technique(technique_name, **parameters))
+    queries = describe_query(query, route)
+    settings = ", ".join(f"{key}={value}" for key, value in parameters.items())
+    for length in lengths:
+        matches = rt.match(queries, route, sequence_length=length)  # type: ignore[arg-type]
+        result = rt.evaluate(matches, truth)
+        low, high = result.accuracy_interval
+        shown = (
+            f"dynamic, mean {matches.sequence_length.mean():.1f}" if length == "dynamic" else length
+        )
+        print(
+            f"| {technique_name} | {settings} | {shown} | {len(matches)} | {result.accuracy:.3f} | "
+            f"{low:.3f}–{high:.3f} | {result.accuracy_all_queries:.3f} | {result.auc:.3f} | "
+            f"{result.auc_single:.3f} |",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main()
