@@ -73,7 +73,8 @@ class Plan {
   public:
     Plan(const RegionalProblem &problem, const RegionalKernel &kernel)
         : problem(problem), kernel(kernel), used(used_regions(problem)),
-          steps(steps_of(problem, kernel)), vectors((used.size() + kernel.lanes - 1) / kernel.lanes),
+          steps(steps_of(problem, kernel)),
+          vectors((used.size() + kernel.lanes - 1) / kernel.lanes),
           count(rounded_up(vectors * kernel.lanes, 16)),
           rows(std::max(problem.regions, kernel.least_rows)),
           copies(!lies_ready(problem, kernel, steps)), query(vectors * kernel.lanes * steps),
@@ -100,8 +101,8 @@ class Plan {
     // One reference in the kernel's form: where it lies, or copied to `scratch`.
     const void *reference(std::size_t r, Words *scratch) const {
         const std::size_t row_bytes = problem.length * value_bytes();
-        const auto *start =
-            static_cast<const unsigned char *>(problem.references) + r * problem.regions * row_bytes;
+        const auto *all = static_cast<const unsigned char *>(problem.references);
+        const auto *start = all + r * problem.regions * row_bytes;
         if (!copies)
             return start;
         for (std::size_t n = 0; n < rows; ++n) {

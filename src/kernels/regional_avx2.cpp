@@ -19,7 +19,9 @@ struct Float32 {
     static Vector spread(const uint32_t *word) {
         return _mm256_broadcast_ss(reinterpret_cast<const float *>(word));
     }
-    static Vector multiply_add(Vector sum, Vector a, Vector b) { return _mm256_fmadd_ps(a, b, sum); }
+    static Vector multiply_add(Vector sum, Vector a, Vector b) {
+        return _mm256_fmadd_ps(a, b, sum);
+    }
     static Vector larger(Vector a, Vector b) { return _mm256_max_ps(a, b); }
     static void store(float *values, Vector a) { _mm256_storeu_ps(values, a); }
 };

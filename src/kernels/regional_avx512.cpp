@@ -17,7 +17,9 @@ struct Float32 {
     static Vector spread(const uint32_t *word) {
         return _mm512_set1_ps(*reinterpret_cast<const float *>(word));
     }
-    static Vector multiply_add(Vector sum, Vector a, Vector b) { return _mm512_fmadd_ps(a, b, sum); }
+    static Vector multiply_add(Vector sum, Vector a, Vector b) {
+        return _mm512_fmadd_ps(a, b, sum);
+    }
     static Vector larger(Vector a, Vector b) { return _mm512_mask_max_ps(a, 0xffff, a, b); }
     static void store(float *values, Vector a) { _mm512_storeu_ps(values, a); }
 };

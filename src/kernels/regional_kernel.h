@@ -21,7 +21,7 @@ struct RegionalKernel {
     std::size_t lanes;      // query regions in one vector
     std::size_t width;      // vectors in one panel; the last panel may be narrower
     std::size_t least_rows; // a reference with fewer regions is padded to these
-    std::size_t step_block; // above this many steps their number must be its multiple; 0 = any may be
+    std::size_t step_block; // more steps than these must be their multiple; 0 = any number may be
 
     // best[g] = max over the `rows` reference regions of the dot product with query region g.
     // query: packed words, [panel][step][vector of the panel][lane], `vectors` vectors in all;

@@ -81,7 +81,8 @@ template <class Simd>
 void best_matches(const void *query, size_t vectors, const void *reference, size_t rows,
                   size_t steps, void *best) {
     constexpr int usual = 32 / Simd::values_per_word;
-    const auto run = steps == usual ? panels<Simd, Simd::width, usual> : panels<Simd, Simd::width, 0>;
+    const auto run =
+        steps == usual ? panels<Simd, Simd::width, usual> : panels<Simd, Simd::width, 0>;
     run(static_cast<const uint32_t *>(query), vectors, static_cast<const uint32_t *>(reference),
         rows, steps, static_cast<typename Simd::Number *>(best));
 }
