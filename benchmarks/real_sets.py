@@ -20,6 +20,9 @@ SETS: dict[str, tuple[str, str, int, int]] = {
     "gardens_point_thumbnails": ("reference", "query", 1, 2),
     "nordland_64x32": ("summer", "winter", 20, 1),
 }
+COLUMNS = (
+    "technique", "parameters", "K", "answered", "accuracy", "95 %", "of all", "AUC", "AUC single",
+)  # fmt: skip
 RUNS: list[tuple[str, dict[str, Any], list[int | str]]] = [
     ("hog", {"form": "vprbench"}, [1, 10]),
     ("hog", {"form": "chapter6"}, [1, 10]),
@@ -42,10 +45,7 @@ def main() -> None:
         truth = rt.aligned(len(query), len(reference), tolerance, every=every)
         print(f"\n**{name}**: {len(query)} queries, {len(reference)} references, "
               f"{truth.description}\n")  # fmt: skip
-        print(
-            "| technique | parameters | K | answered | accuracy | 95 % | of all | AUC | AUC single |"
-        )
-        print("|---|---|---|---|---|---|---|---|---|")
+        print(f"| {' | '.join(COLUMNS)} |\n|{'---|' * len(COLUMNS)}")
         for technique_name, parameters, lengths in RUNS:
             print_rows(query, reference, truth, technique_name, parameters, lengths)
 

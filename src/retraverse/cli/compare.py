@@ -23,6 +23,7 @@ from retraverse.cli.options import (
     read_truth,
 )
 from retraverse.cli.output import print_json, progress, remark
+from retraverse.files import check_writable_place
 from retraverse.images import Traverse, open_traverse
 from retraverse.studies import ComparePlan, ComparisonRecord
 from retraverse.studies import compare as compare_traverses
@@ -52,6 +53,7 @@ def compare(
     The report is one HTML page that opens without network: matched path, scores, pictures side
     by side, times, and, where the truth is known, accuracy and precision.
     """
+    check_writable_place(out)
     plan = ComparePlan(
         technique=make_technique(technique, settings),
         sequence_length=read_sequence_length(sequence_length),

@@ -6,13 +6,14 @@ last column repeats the size of the map, which every judgement of the matches ne
 """
 
 import csv
+import io
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from retraverse.errors import DataMissingError, InputError
-from retraverse.files import replace_file
+from retraverse.files import write_whole
 from retraverse.matching.matches import NO_MATCH, Matches
 
 __all__ = ["load_matches", "save_matches"]
@@ -37,14 +38,15 @@ def save_matches(
 ) -> None:
     """Write matches as CSV; the file is whole or not there."""
     answered = {int(query): window for window, query in enumerate(matches.query)}
-    with replace_file(Path(path)) as file:
-        writer = csv.writer(file)
-        writer.writerow(COLUMNS)
-        for query, name in enumerate(query_names):
-            cells = [""] * 4
-            if query in answered:
-                cells = _answer_cells(matches, answered[query], reference_names)
-            writer.writerow([query, name, *cells, matches.n_references])
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(COLUMNS)
+    for query, name in enumerate(query_names):
+        cells = [""] * 4
+        if query in answered:
+            cells = _answer_cells(matches, answered[query], reference_names)
+        writer.writerow([query, name, *cells, matches.n_references])
+    write_whole(Path(path), text.getvalue().encode())
 
 
 def load_matches(path: Path | str) -> Matches:
