@@ -157,7 +157,10 @@ BAD = [
     (["compare", "{reference}", "{query}", "--set", "roi=last"], "'first', 'each'"),
     (["compare", "{reference}", "{query}", "--set", "roi_entropy=0.8"], "0.7925"),
     (["compare", "{reference}", "{query}", "--aligned", "2", "--radius", "3"], "--aligned and"),
-    (["compare", "{reference}", "{query}", "-t", "hog", "-k", "1", "-o", "no/where.html"], "does not exist"),
+    (
+        ["compare", "{reference}", "{query}", "-t", "hog", "-k", "1", "-o", "no/where.html"],
+        "does not exist",
+    ),
     (["map", "info", "{reference}"], "not a route map"),
     (["localize", "{reference}", "{query}"], "not a route map"),
     (["evaluate", "none.csv", "--aligned", "2"], "no such file"),
