@@ -113,8 +113,8 @@ def compare(
     scores = similarity(queries, route, progress=progress)
     watch.lap("similarity")
     return ComparisonRecord(
-        reference=_traverse_record(reference),
-        query=_traverse_record(query),
+        reference=_traverse_record(reference, progress),
+        query=_traverse_record(query, progress),
         similarity=scores,
         matches=matches,
         evaluation=None if truth is None else evaluate(matches, truth, similarity=scores),
@@ -173,13 +173,13 @@ def _length_points(scores: FloatArray, truth: GroundTruth | None) -> tuple[Lengt
     return tuple(points)
 
 
-def _traverse_record(traverse: Traverse) -> TraverseRecord:
+def _traverse_record(traverse: Traverse, progress: Progress) -> TraverseRecord:
     return TraverseRecord(
         name=traverse.name,
         source=traverse.source,
         n_frames=len(traverse),
         skipped=tuple((frame.name, frame.reason) for frame in traverse.skipped),
-        content_hash=traverse.content_hash(),
+        content_hash=traverse.content_hash(progress),
         sizes=tuple(sorted({traverse[row].size[::-1] for row in _sample(len(traverse))})),
         frame_names=tuple(frame.name for frame in traverse),
     )
