@@ -116,7 +116,7 @@ class Traverse(Sequence[Frame]):
             If a frame cannot be read.
         """
         digest = hashlib.sha256()
-        for frame in progress(self.frames, total=len(self), label=f"Hashing {self.name}"):
+        for frame in progress(self.frames, total=len(self), label=f"hashing {self.name}"):
             # Digests have one length, so no name can run into the contents after it.
             digest.update(hashlib.sha256(frame.name.encode()).digest())
             digest.update(hashlib.sha256(frame.fingerprint()).digest())
@@ -143,7 +143,7 @@ def skip_bad_frames(traverse: Traverse, progress: Progress = no_progress) -> Tra
         If no frame at all can be read.
     """
     good, bad = [], list(traverse.skipped)
-    for frame in progress(traverse.frames, total=len(traverse), label=f"Checking {traverse.name}"):
+    for frame in progress(traverse.frames, total=len(traverse), label=f"checking {traverse.name}"):
         reason = _why_unreadable(frame)
         if reason is None:
             good.append(frame)

@@ -37,7 +37,7 @@ class Texture:
     @property
     def has_alpha(self) -> bool:
         """Whether parts of it are see-through."""
-        return self.pixels.shape[2] == 4
+        return bool(self.pixels.shape[2] == 4)
 
     def level(self, across: int, down: int) -> ImageArray:
         """Return the pixels, halved `across` times in width and `down` times in height."""
@@ -164,10 +164,12 @@ class Canvas:
         target = self.pixels[top:bottom, left:right]
         hazes = self._haze[: bottom - top, : right - left]
         has_alpha = patch.shape[2] == 4
-        alpha = cv2.cvtColor(cv2.extractChannel(patch, 3), cv2.COLOR_GRAY2RGB) if has_alpha else None
+        alpha = None
+        if has_alpha:
+            alpha = cv2.cvtColor(cv2.extractChannel(patch, 3), cv2.COLOR_GRAY2RGB)
         colours = cv2.cvtColor(patch, cv2.COLOR_RGBA2RGB) if has_alpha else patch
         if light is not None:
-            colours = cv2.multiply(colours, (*light.tolist(), 0.0))
+            colours = cv2.multiply(colours, np.array([*light.tolist(), 0.0]))
         if haze > 0.015:
             cover = hazes if alpha is None else cv2.multiply(hazes, alpha, scale=1 / 255)
             colours = cv2.addWeighted(colours, 1.0 - haze, cover, haze, 0.0)
@@ -284,14 +286,13 @@ class _Plane:
                            row + scale * (y + u * ay + v * dy)))  # fmt: skip
         return pixels
 
-    def texel_of_pixel(
-        self, view: View, size: tuple[int, int], origin: tuple[int, int]
-    ) -> Points:
+    def texel_of_pixel(self, view: View, size: tuple[int, int], origin: tuple[int, int]) -> Points:
         """Return the 3 x 3 matrix from pixels, counted from `origin`, to texture pixels."""
         focal, (column, row) = view.camera.focal, view.centre
         column, row = column - origin[0] - 0.5, row - origin[1] - 0.5
         width, height = size
-        a, d = ([value / n for value in edge] for edge, n in ((self.across, width), (self.down, height)))
+        a = [value / width for value in self.across]
+        d = [value / height for value in self.down]
         c = [self.corner[i] + 0.5 * (a[i] + d[i]) for i in range(3)]
         forward = [[focal * edge[k] + (column, row)[k] * edge[2] for edge in (a, d, c)]
                    for k in (0, 1)]  # fmt: skip

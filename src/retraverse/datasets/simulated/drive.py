@@ -218,7 +218,7 @@ def simulate_route(
         d = changes or Disturbances()
         drive_seed = 2 * seed + number
         profile = plan_motion(
-            kind, length_m=length, spacing_m=spacing_m,  # type: ignore[arg-type]
+            kind, length_m=length, spacing_m=spacing_m,
             speed_change=d.speed_change, stops=d.stops, revisits=d.revisits, seed=drive_seed,
         )  # fmt: skip
         frames = profile.frames(drive_seed)

@@ -24,10 +24,10 @@ def finish(canvas: Canvas, rng: np.random.Generator) -> ImageArray:
     if look.wet > 0:
         _mirror_in_road(canvas)
     size = (camera.width, camera.height)
-    picture = np.asarray(cv2.resize(canvas.pixels, size, interpolation=cv2.INTER_AREA))
+    picture = np.asarray(cv2.resize(canvas.pixels, size, interpolation=cv2.INTER_AREA), np.uint8)
     if look.darkness > 0.1:
         picture = _bloom(picture, look.darkness)
-    picture = np.asarray(cv2.multiply(picture, _vignette(*size), dtype=cv2.CV_8U))
+    picture = np.asarray(cv2.multiply(picture, _vignette(*size), dtype=cv2.CV_8U), np.uint8)
     if look.rain > 0:
         picture = _streaks(picture, look.rain, rng)
     if look.darkness > 0:
@@ -39,7 +39,7 @@ def finish(canvas: Canvas, rng: np.random.Generator) -> ImageArray:
 def _glow_sprite() -> FloatArray:
     axis = np.linspace(-2.6, 2.6, 65, dtype=np.float32)
     square = axis[None] ** 2 + axis[:, None] ** 2
-    return np.clip(np.exp(-square) - 0.0012, 0, 1).astype(np.float32)
+    return np.asarray(np.clip(np.exp(-square) - 0.0012, 0, 1), np.float32)
 
 
 def _add_glow(
@@ -84,9 +84,10 @@ def _bloom(picture: ImageArray, darkness: float) -> ImageArray:
     height, width = picture.shape[:2]
     small = cv2.resize(picture, (max(1, width // 4), max(1, height // 4)),
                        interpolation=cv2.INTER_AREA)  # fmt: skip
-    bright = cv2.GaussianBlur(cv2.subtract(small, (120.0, 120.0, 120.0, 0.0)), (0, 0), 2.2)
+    threshold = np.array([120.0, 120.0, 120.0, 0.0])
+    bright = cv2.GaussianBlur(cv2.subtract(small, threshold), (0, 0), 2.2)
     large = cv2.resize(bright, (width, height), interpolation=cv2.INTER_LINEAR)
-    return np.asarray(cv2.addWeighted(picture, 1.0, large, 0.8 * darkness, 0))
+    return np.asarray(cv2.addWeighted(picture, 1.0, large, 0.8 * darkness, 0), np.uint8)
 
 
 @lru_cache(maxsize=4)
@@ -109,7 +110,7 @@ def _streaks(picture: ImageArray, rain: float, rng: np.random.Generator) -> Imag
         long = int(rng.integers(4, 14) * height / 240)
         tone = float(rng.uniform(150, 215)) * (0.35 + 0.65 * float(picture[y, x].mean()) / 255)
         cv2.line(layer, (x, y), (x - long // 5, y + long), (tone, tone, tone), 1, cv2.LINE_AA)
-    return np.asarray(cv2.addWeighted(picture, 0.55, layer, 0.45, 0))
+    return np.asarray(cv2.addWeighted(picture, 0.55, layer, 0.45, 0), np.uint8)
 
 
 def _add_noise(picture: ImageArray, deviation: float, rng: np.random.Generator) -> ImageArray:

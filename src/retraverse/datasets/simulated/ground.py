@@ -238,11 +238,12 @@ class GroundPainter:
                 ds, dd = -high * reach * along, -high * reach * right
                 if dd * thing.side < 0:
                     corners = [(thing.start_m, front), (thing.end_m, front),
-                               (thing.end_m + ds, front + dd), (thing.start_m + ds, front + dd)]  # fmt: skip
+                               (thing.end_m + ds, front + dd),
+                               (thing.start_m + ds, front + dd)]  # fmt: skip
                     cv2.fillConvexPoly(mask, cells(corners), 225, shift=4)
             elif isinstance(thing, Tree):
                 self._tree_shadow(mask, thing, cells, (along * reach, right * reach))
-        return np.asarray(cv2.GaussianBlur(mask, (0, 0), 1.6), np.float32) / 255
+        return np.asarray(cv2.GaussianBlur(mask, (0, 0), 1.6), np.float32) / np.float32(255)
 
     def _tree_shadow(
         self, mask: ImageArray, tree: Tree, cells: object, reach: tuple[float, float]
@@ -254,11 +255,12 @@ class GroundPainter:
         tone = 70 + 130 * self.look.leaves
         middle = (tree.key_m - 0.6 * tree.height_m * reach[0],
                   tree.lateral_m - 0.6 * tree.height_m * reach[1])  # fmt: skip
-        assert callable(cells)
         for _ in range(14):
             s, d = np.array(middle) + rng.normal(0, 0.17 * tree.height_m, 2)
             at = cells([(float(s), float(d))])[0]
-            size = (round(0.11 * tree.height_m * PER_D * 16), round(0.11 * tree.height_m * PER_S * 16))
+            size = [
+                round(0.11 * tree.height_m * cells_a_metre * 16) for cells_a_metre in (PER_D, PER_S)
+            ]
             turn = np.linspace(0, 2 * np.pi, 10, endpoint=False)
             ring = at + np.stack([np.cos(turn) * size[0], np.sin(turn) * size[1]], axis=1)
             cv2.fillConvexPoly(mask, np.round(ring).astype(np.int32), tone, shift=4)
@@ -269,7 +271,7 @@ def _wear(d: Metres) -> FloatArray:
     lane = np.abs(np.abs(d) - LANE_M / 2)
     tone = 1.0 - 0.07 * np.exp(-((lane / 0.3) ** 2)) + 0.05 * np.exp(-(((lane - 0.75) / 0.25) ** 2))
     edge = 1.0 - 0.16 * np.exp(-(((np.abs(d) - KERB_M) / 0.5) ** 2))
-    return np.where(np.abs(d) < KERB_M, tone * edge, 1.0).astype(np.float32)
+    return np.asarray(np.where(np.abs(d) < KERB_M, tone * edge, 1.0), np.float32)
 
 
 def _snow_cover(s: Metres, d: Metres, snow: float) -> FloatArray:
@@ -283,7 +285,7 @@ def _snow_cover(s: Metres, d: Metres, snow: float) -> FloatArray:
     depth = depth - 0.5 * np.exp(-(((lane - 0.75) / 0.3) ** 2)) * (away < LANE_M)
     field = fractal_noise((512, 512), 71, cells=12, octaves=5)
     noise = field[(s * 9).astype(int) % 512, (d * 14).astype(int) % 512]
-    return np.clip((1.1 * depth * snow - noise) * 4, 0, 0.95).astype(np.float32)
+    return np.asarray(np.clip((1.1 * depth * snow - noise) * 4, 0, 0.95), np.float32)
 
 
 def _grain(s: FloatArray, d: FloatArray, depth: FloatArray) -> FloatArray:
@@ -300,7 +302,7 @@ def _grain(s: FloatArray, d: FloatArray, depth: FloatArray) -> FloatArray:
 def _grain_tile() -> FloatArray:
     fine = fractal_noise((512, 512), 70, cells=64, octaves=3)
     broad = fractal_noise((512, 512), 72, cells=3, octaves=4)
-    return 0.32 * (fine - fine.mean()) + 0.2 * (broad - broad.mean())
+    return np.asarray(0.32 * (fine - fine.mean()) + 0.2 * (broad - broad.mean()), np.float32)
 
 
 def _headlights(view: View, depth: FloatArray, width: int, step: int) -> FloatArray:

@@ -69,9 +69,7 @@ class HousePainter:
             top = UP * (building.eaves_m + (building.roof_m if building.roof == "gable" else 0.0))
             canvas.panel(self._front(building), plan.start + top, plan.along, -top)
 
-    def _draw_roof(
-        self, canvas: Canvas, building: Building, plan: _Corners, eaves: Points
-    ) -> None:
+    def _draw_roof(self, canvas: Canvas, building: Building, plan: _Corners, eaves: Points) -> None:
         """Draw the slope towards the street, or for a gable the slope towards the camera."""
         rise = UP * building.roof_m
         if building.roof == "gable":

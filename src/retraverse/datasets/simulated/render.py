@@ -126,13 +126,16 @@ class Painter:
         if body is not None:
             turn = canvas.view.heading - seen.heading + math.pi * (car.lateral_m < 0)
             light = self._light(canvas.view, car.key_m, car.lateral_m)
-            draw_vehicle(canvas, vehicle_body(body), Place(*seen.anchors[0].tolist(), turn, light))
+            right, down, forward = seen.anchors[0].tolist()
+            place = Place(right, down, forward, turn, light)
+            draw_vehicle(canvas, vehicle_body(body), place)
 
     def _draw_mover(self, canvas: Canvas, mover: Mover) -> None:
         view, s, d = canvas.view, mover.key_m, mover.lateral_m
-        spot = view.to_camera(self.street.line.points(s, d))[0].tolist()
+        right, down, forward = view.to_camera(self.street.line.points(s, d))[0].tolist()
         turn = view.heading - float(self.street.line.heading_at(s)) + math.pi * mover.is_oncoming
-        place = Place(*spot, turn, self._light(view, s, d), is_moving=True)
+        light = self._light(view, s, d)
+        place = Place(right, down, forward, turn, light, is_moving=True)
         if mover.kind == "person":
             draw_person(canvas, mover.seed, place, mover.phase)
         else:
@@ -205,7 +208,8 @@ def _pole(foot: Points, height: float, width: float) -> list[Points]:
     """Return an upright post that tapers, and its lit edge: two faces of four corners."""
     side, up = np.array([width / 2, 0.0, 0.0]), np.array([0.0, -height, 0.0])
     post = np.array([foot - side, foot + side, foot + up + side * 0.7, foot + up - side * 0.7])
-    edge = np.array([foot - side, foot - side * 0.3, foot + up - side * 0.2, foot + up - side * 0.7])
+    edge = np.array([foot - side, foot - side * 0.3,
+                     foot + up - side * 0.2, foot + up - side * 0.7])  # fmt: skip
     return [post, edge]
 
 

@@ -309,7 +309,7 @@ def _kerbside(seed: int, side: int, end_m: float, grounds: list[Ground]) -> list
     def is_free(s: float) -> bool:
         return not any(a - 1.5 < s < b + 1.5 for a, b in openings)
 
-    things = [
+    things: list[Thing] = [
         *_lamps(seed, side, end_m),
         *_street_trees(seed, side, end_m),
         *_parked_cars(seed, side, end_m),

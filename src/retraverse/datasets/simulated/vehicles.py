@@ -86,7 +86,8 @@ class Place:
     def camera_local(self) -> tuple[float, float]:
         """Return the camera's x and y in the solid's own axes."""
         cosine, sine = math.cos(self.turn), math.sin(self.turn)
-        return -self.right * cosine + self.forward * sine, -self.right * sine - self.forward * cosine
+        x = -self.right * cosine + self.forward * sine
+        return x, -self.right * sine - self.forward * cosine
 
 
 @dataclass

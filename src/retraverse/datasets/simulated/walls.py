@@ -14,7 +14,7 @@ from retraverse.datasets.simulated.canvas import FULL, Point, Texture
 from retraverse.datasets.simulated.conditions import Look
 from retraverse.datasets.simulated.noise import fractal_noise
 from retraverse.datasets.simulated.things import Building, WallKind
-from retraverse.types import FloatArray, ImageArray
+from retraverse.types import Array, FloatArray, ImageArray
 
 __all__ = ["paint_end_wall", "paint_front", "paint_roof"]
 
@@ -22,6 +22,8 @@ PX = 24
 """Texture pixels a metre."""
 SNOW = (236, 240, 246)
 TILE = 256
+SHOP_COLOURS = ((150, 40, 38), (36, 74, 110), (40, 92, 66), (196, 150, 50), (70, 52, 92),
+                (50, 52, 56))  # fmt: skip
 
 
 class Sheet:
@@ -47,7 +49,7 @@ class Sheet:
         """Fill a rectangle with a colour."""
         self.colours[self.area(x0, z0, x1, z1)] = colour
 
-    def light(self, x0: float, z0: float, x1: float, z1: float, colour: FloatArray) -> None:
+    def light(self, x0: float, z0: float, x1: float, z1: float, colour: Array) -> None:
         """Make a rectangle shine."""
         self.lights[self.area(x0, z0, x1, z1)] = np.clip(colour, 0, 255)
 
@@ -251,8 +253,7 @@ def _door(
 def _shop(sheet: Sheet, building: Building, rng: np.random.Generator, look: Look) -> None:
     """Paint a shop: a wide pane, door, sign with pretended letters, sometimes an awning."""
     top, width = building.storey_m, sheet.width_m
-    accents = ((150, 40, 38), (36, 74, 110), (40, 92, 66), (196, 150, 50), (70, 52, 92), (50, 52, 56))
-    accent = accents[int(rng.integers(6))]
+    accent = SHOP_COLOURS[int(rng.integers(6))]
     sheet.box(0.2, 0.0, width - 0.2, top - 0.1, tuple(int(c * 0.55) for c in accent))
     panes = max(2, round(width / 2.6))
     step = (width - 0.8) / panes
@@ -391,7 +392,9 @@ def _lit(sheet: Sheet, look: Look, light: FloatArray) -> ImageArray:
     import cv2
 
     rows, columns = sheet.colours.shape[:2]
-    large = cv2.resize(light, (columns, rows), interpolation=cv2.INTER_LINEAR)
+    large = np.asarray(
+        cv2.resize(light, (columns, rows), interpolation=cv2.INTER_LINEAR), np.float32
+    )
     foot = max(1, min(rows, round(1.3 * sheet.px)))
     large[-foot:] *= np.linspace(1.0, 0.66, foot, dtype=np.float32)[:, None, None]
     shone = cv2.multiply(sheet.colours, large, dtype=cv2.CV_8U)
