@@ -27,6 +27,7 @@ from retraverse.files import check_writable_place
 from retraverse.images import Traverse, open_traverse
 from retraverse.studies import ComparePlan, ComparisonRecord
 from retraverse.studies import compare as compare_traverses
+from retraverse.types import Progress
 
 __all__ = ["compare", "summarise"]
 
@@ -77,18 +78,20 @@ def compare(
         ),
         progress=show,
     )
-    write_report(record, out, reference_traverse, query_traverse)
+    write_report(record, out, reference_traverse, query_traverse, show)
     if json_output:
         print_json(summarise(record, out))
     else:
         print_summary(record, out)
 
 
-def write_report(record: ComparisonRecord, out: Path, reference: Traverse, query: Traverse) -> None:
+def write_report(
+    record: ComparisonRecord, out: Path, reference: Traverse, query: Traverse, show: Progress
+) -> None:
     """Write the report of a comparison."""
     from retraverse.reports import write_comparison_report
 
-    write_comparison_report(record, out, reference=reference, query=query)
+    write_comparison_report(record, out, reference=reference, query=query, progress=show)
 
 
 def print_summary(record: ComparisonRecord, out: Path) -> None:

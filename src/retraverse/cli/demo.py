@@ -54,7 +54,7 @@ def demo(
         make_technique(technique), read_sequence_length(sequence_length), command=command
     )
     record = compare_traverses(reference, query, plan, truth, progress=show)
-    write_report(record, out / "report.html", reference, query)
+    write_report(record, out / "report.html", reference, query, show)
     print_summary(record, out / "report.html")
     print("open the report in a browser; the same on your own pictures:")
     print("  retraverse compare FIRST_DRIVE SECOND_DRIVE")

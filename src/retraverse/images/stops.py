@@ -46,7 +46,7 @@ def measure_motion(traverse: Traverse, *, progress: Progress = no_progress) -> N
     FrameReadError
         If a picture cannot be read.
     """
-    frames = progress(traverse, total=len(traverse), label=f"Motion of {traverse.name}")
+    frames = progress(traverse, total=len(traverse), label=f"motion of {traverse.name}")
     thumbnails = (_thumbnail(frame) for frame in frames)
     return np.array([_motion(a, b) for a, b in itertools.pairwise(thumbnails)], np.float64)
 
@@ -85,7 +85,7 @@ def without_stops(
         return traverse
     kept: list[Frame] = []
     last: FloatArray | None = None
-    for frame in progress(traverse, total=len(traverse), label=f"Stops of {traverse.name}"):
+    for frame in progress(traverse, total=len(traverse), label=f"stops of {traverse.name}"):
         thumbnail = _thumbnail(frame)
         if last is None or _motion(last, thumbnail) >= min_motion:
             kept.append(frame)

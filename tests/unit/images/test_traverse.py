@@ -91,7 +91,7 @@ def test_content_hash_tells_contents_names_and_order_apart(make_folder: MakeFold
 def test_content_hash_shows_progress(traverse: Traverse) -> None:
     watcher = Watcher()
     assert traverse.content_hash(watcher) == traverse.content_hash()
-    assert watcher.seen == [("Hashing drive", 12, 12)]
+    assert watcher.seen == [("hashing drive", 12, 12)]
 
 
 def test_bad_frames_are_skipped_counted_and_told(make_folder: MakeFolder) -> None:
@@ -105,7 +105,7 @@ def test_bad_frames_are_skipped_counted_and_told(make_folder: MakeFolder) -> Non
     assert (traverse.skipped[1].name, traverse.skipped[1].index) == ("3.png", 3)
     assert "truncated" in traverse.skipped[1].reason
     assert traverse.source == f"folder {folder} (5 pictures), 2 skipped"
-    assert watcher.seen == [("Checking drive", 5, 5)]
+    assert watcher.seen == [("checking drive", 5, 5)]
     assert traverse[:1].skipped == traverse.skipped
 
 
