@@ -4,7 +4,8 @@ Run: .venv/bin/python benchmarks/dynamic_length.py [DATA_FOLDER]
 
 For each technique: its calibrated information threshold, how long its windows become, and its
 accuracy beside fixed lengths (10, and the mean dynamic one). ``published`` is regional HOG under
-the published 0.9. ``of all`` counts frames that got no answer as wrong; tolerances in _real_sets.py.
+the published 0.9. ``of all`` counts frames that got no answer as wrong; tolerances are in
+_real_sets.py.
 """
 
 from collections.abc import Mapping

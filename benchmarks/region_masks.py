@@ -22,9 +22,7 @@ LENGTHS = (1, 10)
 
 
 def main() -> None:
-    print(
-        "| drive | masked | learned in | K = 1 | less no mask, 95 % | K = 10 | less no mask, 95 % |"
-    )
+    print("| drive | masked | learned in | K = 1 | gain, 95 % | K = 10 | gain, 95 % |")
     print("|---|---|---|---|---|---|---|")
     for real in real_sets(data_folder()):
         print_rows(real)

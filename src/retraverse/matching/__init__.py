@@ -6,10 +6,12 @@ Conventions
 - -1 is the answer "no match"; a query frame that starts no window has no answer at all.
 """
 
+from retraverse.matching.balance import RunningBalance, balance
 from retraverse.matching.calibrated_length import (
     calibrate_growth,
     calibrated_windows,
     describe_entropy,
+    ensure_entropy,
     with_entropy,
 )
 from retraverse.matching.dynamic_length import GrowthRule, Window, dynamic_windows
@@ -31,13 +33,16 @@ __all__ = [
     "GrowthRule",
     "Matches",
     "RegionMask",
+    "RunningBalance",
     "SequenceLength",
     "Window",
+    "balance",
     "calibrate_growth",
     "calibrated_windows",
     "describe_entropy",
     "describe_query",
     "dynamic_windows",
+    "ensure_entropy",
     "fuse",
     "learn_region_mask",
     "load_matches",

@@ -42,6 +42,7 @@ __all__ = [
     "calibrate_growth",
     "calibrated_windows",
     "describe_entropy",
+    "ensure_entropy",
     "with_entropy",
 ]
 
@@ -171,6 +172,26 @@ def with_entropy(queries: Descriptions, entropy: Array) -> Descriptions:
             f"entropy: got shape {entropy.shape}, expected ({len(queries)},): one per frame"
         )
     return Descriptions({**queries.arrays, "entropy": entropy.astype(np.float64)})
+
+
+def ensure_entropy(
+    queries: Descriptions, query: Traverse | Descriptions, *, progress: Progress = no_progress
+) -> Descriptions:
+    """Return the descriptions of a drive with its entropy, measured where it is not stored.
+
+    Parameters
+    ----------
+    queries : Descriptions
+        Of `query`.
+    query : Traverse or Descriptions
+        Where the pictures come from; from descriptions alone nothing can be measured, and
+        `queries` is returned as it is.
+    progress : Progress
+        Watches the frames.
+    """
+    if "entropy" in queries.arrays or isinstance(query, Descriptions):
+        return queries
+    return with_entropy(queries, describe_entropy(query, progress=progress))
 
 
 class Overlap:

@@ -14,9 +14,8 @@ brought to a common scale first:
     For each query the one technique that is surest: whose best reference is furthest ahead of the
     best one elsewhere (uniqueness, in standard deviations). The others' votes are lost.
 ``balanced``
-    As ``sum``, then each reference's fused similarities to mean 0 and standard deviation 1 over
-    the *queries*: references that look like everything (hubs) lose their advantage. Needs the
-    whole query drive, so it is for offline use; the other modes treat every row by itself.
+    As ``sum``, then references that look like everything lose their advantage (`balance`). Needs
+    the whole query drive, so it is for offline use; the other modes treat every row by itself.
 
 All modes ignore the order of techniques and any change of scale or offset (positive affine) of a
 technique's similarities. A technique that says the same of every reference, as one without
@@ -30,6 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from retraverse.errors import ConfigError, InputError, ShapeError
+from retraverse.matching.balance import balance, standardise
 from retraverse.types import FloatArray
 
 __all__ = ["FusionMode", "fuse", "uniqueness"]
@@ -37,8 +37,6 @@ __all__ = ["FusionMode", "fuse", "uniqueness"]
 FusionMode = Literal["sum", "rank", "switch", "balanced"]
 EXCLUDED = 5
 """References on either side of the best that are the same place: uniqueness looks beyond."""
-FLAT = 1e-7
-"""A standard deviation below this share of the values' size is rounding, not a difference."""
 
 Float64Array = NDArray[np.float64]
 
@@ -73,7 +71,8 @@ def fuse(similarities: Sequence[FloatArray], mode: FusionMode = "sum") -> FloatA
     Measured on published matrices of ten techniques (Corridor, single frames): ``sum`` gives
     0.685 from the three cheap ones (CALC, CoHOG, HOG), whose best has 0.622, and 0.919 from all
     ten, whose best has 0.901; ``rank`` (0.595, 0.883) and ``switch`` (0.613, 0.820) lose to the
-    best single technique; ``balanced`` gives 0.856 and 0.973.
+    best single technique; ``balanced`` gives 0.856 and 0.982. On drives where one technique is much
+    worse than the other, the best single one beats ``sum``: see `docs/matching.md`.
 
     Examples
     --------
@@ -89,11 +88,11 @@ def fuse(similarities: Sequence[FloatArray], mode: FusionMode = "sum") -> FloatA
     matrices = _check(similarities)
     if mode == "rank":
         return _mean([_ranks(matrix) for matrix in matrices])
-    standard = [_standardise(matrix, axis=1) for matrix in matrices]
+    standard = [standardise(matrix, axis=1) for matrix in matrices]
     if mode == "switch":
         return _surest(standard)
     fused = _mean(standard)
-    return fused if mode == "sum" else _balance(fused)
+    return fused if mode == "sum" else balance(fused)
 
 
 def uniqueness(similarity: FloatArray, *, excluded: int = EXCLUDED) -> Float64Array:
@@ -110,7 +109,7 @@ def uniqueness(similarity: FloatArray, *, excluded: int = EXCLUDED) -> Float64Ar
     uniqueness : float64 array, shape (Q,)
         In standard deviations of the row, from 0 up, unless the best has no elsewhere: then 0.
     """
-    return _lead(_standardise(_check([similarity])[0], axis=1), excluded)
+    return _lead(standardise(_check([similarity])[0], axis=1), excluded)
 
 
 def _check(similarities: Sequence[FloatArray]) -> list[Float64Array]:
@@ -129,16 +128,6 @@ def _check(similarities: Sequence[FloatArray]) -> list[Float64Array]:
                 f"similarities[{number}]: holds NaN or infinity, expected finite numbers"
             )
     return matrices
-
-
-def _standardise(matrix: Float64Array, axis: int) -> Float64Array:
-    """Return it with mean 0 and standard deviation 1 along an axis; constant: all 0."""
-    deviation = matrix.std(axis=axis, keepdims=True)
-    size = np.abs(matrix).max(axis=axis, keepdims=True, initial=0)
-    differs = deviation > FLAT * size
-    centred = matrix - matrix.mean(axis=axis, keepdims=True)
-    scaled: Float64Array = centred * differs / np.where(differs, deviation, 1)
-    return scaled
 
 
 def _ranks(matrix: Float64Array) -> Float64Array:
@@ -172,12 +161,3 @@ def _lead(rows: Float64Array, excluded: int) -> Float64Array:
     distance = np.abs(np.arange(rows.shape[1]) - best[:, np.newaxis])
     second = np.where(distance > excluded, rows, -np.inf).max(axis=1)
     return np.where(np.isfinite(second), rows.max(axis=1) - second, 0.0)
-
-
-def _balance(fused: FloatArray) -> FloatArray:
-    if len(fused) < 2:
-        raise InputError(
-            f"fusion mode 'balanced': got {len(fused)} queries, expected at least 2: it compares "
-            "each reference over the whole query drive"
-        )
-    return _standardise(fused.astype(np.float64), axis=0).astype(np.float32)

@@ -133,8 +133,8 @@ def make_look(disturbances: Disturbances) -> Look:
 
 def _sky_colours(night: float, overcast: float) -> tuple[FloatArray, FloatArray]:
     """Return the colours of the sky overhead and at the horizon."""
-    zenith = blend(_rgb(112, 160, 214), _rgb(184, 190, 198), overcast)
-    horizon = blend(_rgb(214, 226, 236), _rgb(218, 221, 225), overcast)
+    zenith = blend(_rgb(108, 162, 222), _rgb(190, 196, 204), overcast)
+    horizon = blend(_rgb(218, 230, 240), _rgb(218, 221, 225), overcast)
     dusk_low = blend(_rgb(206, 138, 100), _rgb(112, 110, 118), overcast)
     return (
         _through_night(zenith, _rgb(62, 74, 112), _rgb(9, 11, 21), night),

@@ -10,7 +10,7 @@ from retraverse.types import FloatArray, ImageArray
 
 __all__ = ["finish"]
 
-NOISE = 13.0
+NOISE = 10.0
 """Standard deviation of the sensor's noise at full night, grey levels."""
 
 
@@ -19,10 +19,10 @@ def finish(canvas: Canvas, rng: np.random.Generator) -> ImageArray:
     import cv2
 
     look, camera = canvas.look, canvas.view.camera
-    for column, row, radius, colour in canvas.glows:
-        _add_glow(canvas.pixels, column, row, radius, colour)
     if look.wet > 0:
         _mirror_in_road(canvas)
+    for column, row, radius, colour in canvas.glows:
+        _add_glow(canvas.pixels, column, row, radius, colour)
     size = (camera.width, camera.height)
     picture = np.asarray(cv2.resize(canvas.pixels, size, interpolation=cv2.INTER_AREA), np.uint8)
     if look.darkness > 0.1:
@@ -74,7 +74,11 @@ def _mirror_in_road(canvas: Canvas) -> None:
     mirrored = np.ascontiguousarray(canvas.pixels[horizon - rows : horizon][::-1])
     smeared = cv2.blur(mirrored, (5, 41))
     weight = 0.34 * canvas.look.wet
-    below[:rows] = cv2.addWeighted(below[:rows], 1 - 0.6 * weight, smeared, weight, 0)
+    wet = cv2.addWeighted(below[:rows], 1 - 0.6 * weight, smeared, weight, 0)
+    if canvas.bare_ground is not None:
+        bare = canvas.bare_ground[horizon : horizon + rows]
+        is_bare = (cv2.absdiff(below[:rows], bare).max(axis=2) == 0).astype(np.uint8)
+        cv2.copyTo(wet, is_bare, below[:rows])
 
 
 def _bloom(picture: ImageArray, darkness: float) -> ImageArray:

@@ -128,15 +128,15 @@ def _draw_leaves(
 ) -> None:  # fmt: skip
     """Draw the leaves that are left: dark ones first, those in the light last."""
     tips = np.array([twig.end for twig in twigs if twig.depth >= 3])
-    tufts = max(3, 1500 // len(tips))
+    tufts = max(3, 2200 // len(tips))
     count = len(tips) * tufts
-    places = np.repeat(tips, tufts, axis=0) + rng.normal(0, 14.0, (count, 2))
-    sizes, order = rng.uniform(3.5, 9.0, count), rng.random(count)
+    places = np.repeat(tips, tufts, axis=0) + rng.normal(0, 17.0, (count, 2))
+    sizes, order = rng.uniform(2.5, 7.0, count), rng.random(count)
     own, tint = rng.normal(0, 0.1, count), rng.integers(4)
     left = order < look.leaves
     centre, extent = tips.mean(axis=0), tips.std(axis=0) + 1
     across, down = ((places - centre) / extent).T
-    light = 0.92 - 0.20 * down - 0.10 * across + own
+    light = 0.95 - 0.20 * down - 0.10 * across + own
     green = np.array(SUMMER[int(tint)], np.float32)
     turned = np.array(TURNED[int(tint)], np.float32)
     leaf = blend(green, turned, look.autumn)

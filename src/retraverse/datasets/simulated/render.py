@@ -40,6 +40,8 @@ POSTS = {"bin": (1.05, 0.55, (58, 74, 60)), "bollard": (0.95, 0.16, (60, 60, 64)
 """Height, width and colour of small things on the pavement."""
 PLATES = (((170, 34, 36), (226, 226, 222)), ((36, 70, 140), (52, 92, 170)))
 """Rim and face of traffic signs."""
+SMALL_M, CARS_M = 75.0, 130.0
+"""Signs and parked cars farther away are left out."""
 TREE_FORMS = 14
 """How many different sprites of each kind of tree a street has."""
 
@@ -92,6 +94,8 @@ class Painter:
         sky = self._sky_window.cut(self._panorama, view.heading, view.pitch)
         canvas.pixels[: len(sky)] = sky
         self._ground.paint(canvas)
+        if self.look.wet > 0:
+            canvas.bare_ground = canvas.pixels.copy()
         here = view.position_m
         seen: list[Seen | Mover] = list(self._scene.seen(view, here - 2, here + VIEW_M))
         seen += [mover for mover in traffic.movers(frame) if mover.key_m > here - 4]
@@ -123,7 +127,7 @@ class Painter:
 
     def _draw_parked(self, canvas: Canvas, car: ParkedCar, seen: Seen, traffic: Traffic) -> None:
         body = traffic.parked_body(car)
-        if body is not None:
+        if body is not None and seen.anchors[0, 2] < CARS_M:
             turn = canvas.view.heading - seen.heading + math.pi * (car.lateral_m < 0)
             light = self._light(canvas.view, car.key_m, car.lateral_m)
             right, down, forward = seen.anchors[0].tolist()
@@ -189,7 +193,7 @@ class Painter:
 
     def _draw_sign(self, canvas: Canvas, sign: Sign, foot: Points) -> None:
         """Draw a traffic sign on its post, or a bin, bollard or cabinet."""
-        if foot[2] < NEAR_M:
+        if not NEAR_M < foot[2] < SMALL_M:
             return
         tall, wide, tone = POSTS.get(sign.kind, (2.4, 0.07, (120, 122, 124)))
         colour = np.array(tone, np.float32)
