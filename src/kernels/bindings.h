@@ -7,3 +7,7 @@
 void bind_regional(nanobind::module_ &module);
 void bind_encoding(nanobind::module_ &module);
 void bind_diagonal(nanobind::module_ &module);
+void bind_dtw(nanobind::module_ &module);
+void bind_states(nanobind::module_ &module);
+void bind_graph(nanobind::module_ &module);
+void bind_trajectories(nanobind::module_ &module);

@@ -6,4 +6,8 @@ NB_MODULE(_native, module) {
     bind_regional(module);
     bind_encoding(module);
     bind_diagonal(module);
+    bind_dtw(module);
+    bind_states(module);
+    bind_graph(module);
+    bind_trajectories(module);
 }

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from retraverse.datasets import GroundTruth, aligned, from_positions, ground_truth
     from retraverse.images import Frame, Traverse, open_traverse
     from retraverse.maps import RouteMap, build_map, load_map
-    from retraverse.matching import Matches, match, match_similarity, similarity
+    from retraverse.matching import Matcher, Matches, match, match_similarity, similarity
+    from retraverse.matching.matchers import matcher, matchers
     from retraverse.metrics import Evaluation, evaluate
     from retraverse.techniques import Technique, technique, techniques
 
@@ -28,6 +29,7 @@ __all__ = [
     "Evaluation",
     "Frame",
     "GroundTruth",
+    "Matcher",
     "Matches",
     "RouteMap",
     "Technique",
@@ -41,6 +43,8 @@ __all__ = [
     "load_map",
     "match",
     "match_similarity",
+    "matcher",
+    "matchers",
     "open_traverse",
     "similarity",
     "technique",
@@ -51,7 +55,8 @@ _ROOMS = {
     "datasets": ("GroundTruth", "aligned", "from_positions", "ground_truth"),
     "images": ("Frame", "Traverse", "open_traverse"),
     "maps": ("RouteMap", "build_map", "load_map"),
-    "matching": ("Matches", "match", "match_similarity", "similarity"),
+    "matching": ("Matcher", "Matches", "match", "match_similarity", "similarity"),
+    "matching.matchers": ("matcher", "matchers"),
     "metrics": ("Evaluation", "evaluate"),
     "techniques": ("Technique", "technique", "techniques"),
 }

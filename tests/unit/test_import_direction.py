@@ -8,7 +8,7 @@ import pytest
 SOURCE = Path(__file__).resolve().parents[2] / "src" / "retraverse"
 CORRIDOR = (
     ("errors", "types", "_version"),
-    ("files",),
+    ("files", "registry"),
     ("kernels",),
     ("images",),
     ("datasets",),

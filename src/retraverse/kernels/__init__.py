@@ -2,7 +2,8 @@
 
 Every function here runs compiled code where it was built, else NumPy with the same result.
 Contents: how kernels run (`backend`), regional matching (`regional`), regional HOG and local
-entropy (`encoding`), sequence scores along the diagonals of a similarity matrix (`diagonal`).
+entropy (`encoding`), sequence scores along the diagonals of a similarity matrix (`diagonal`),
+straight trajectories of several slopes (`trajectories`), paths of any speed (`paths`).
 """
 
 from retraverse.kernels.backend import backend, default_threads, instruction_sets
@@ -14,20 +15,41 @@ from retraverse.kernels.diagonal import (
     diagonal_scores,
 )
 from retraverse.kernels.encoding import local_entropy, region_entropies, regional_hog
+from retraverse.kernels.paths import (
+    GraphRows,
+    Motion,
+    ViterbiRows,
+    backward,
+    dtw_steps,
+    forward,
+    graph,
+    viterbi,
+)
 from retraverse.kernels.regional import quantise_regions, regional_scores
+from retraverse.kernels.trajectories import BestTrajectories, best_trajectories
 
 __all__ = [
     "BestDiagonals",
+    "BestTrajectories",
     "DiagonalSums",
+    "GraphRows",
+    "Motion",
+    "ViterbiRows",
     "backend",
+    "backward",
     "best_diagonals",
     "best_diagonals_variable",
+    "best_trajectories",
     "default_threads",
     "diagonal_scores",
+    "dtw_steps",
+    "forward",
+    "graph",
     "instruction_sets",
     "local_entropy",
     "quantise_regions",
     "region_entropies",
     "regional_hog",
     "regional_scores",
+    "viterbi",
 ]

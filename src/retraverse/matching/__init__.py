@@ -2,7 +2,8 @@
 
 Conventions
 - ``similarity[query, reference]``, higher is more alike.
-- A window is named by its first query frame and answered by the first reference frame.
+- A window is named by its first query frame and answered by the first reference frame; a matcher
+  for which it is another frame (`matchers`) says so.
 - -1 is the answer "no match"; a query frame that starts no window has no answer at all.
 """
 
@@ -17,6 +18,7 @@ from retraverse.matching.calibrated_length import (
 from retraverse.matching.dynamic_length import GrowthRule, Window, dynamic_windows
 from retraverse.matching.fusion import FusionMode, fuse, uniqueness
 from retraverse.matching.match_traverse import SequenceLength, match, match_similarity
+from retraverse.matching.matchers import Matcher, OnlineMatcher
 from retraverse.matching.matches import NO_MATCH, Matches
 from retraverse.matching.matches_file import load_matches, save_matches
 from retraverse.matching.pairwise import describe_query, similarity
@@ -31,7 +33,9 @@ __all__ = [
     "NO_MATCH",
     "FusionMode",
     "GrowthRule",
+    "Matcher",
     "Matches",
+    "OnlineMatcher",
     "RegionMask",
     "RunningBalance",
     "SequenceLength",

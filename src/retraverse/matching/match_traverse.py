@@ -1,21 +1,39 @@
-"""Matching a drive, or a ready similarity matrix, in windows of one length or of their own."""
+"""Matching a drive, or a ready similarity matrix, in windows of one length or of their own.
 
+The mean of the diagonal has ways of its own: block by block, so that the matrix is never whole,
+with dynamic lengths, and with the region of interest of a window's first frame. All other
+matchers take the whole matrix of single frames, each under its own region of interest.
+"""
+
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
-from retraverse.errors import ConfigError, InputError, ShapeError
+from retraverse.errors import ConfigError
 from retraverse.images import Traverse
 from retraverse.maps import RouteMap
+from retraverse.matching.checks import (
+    check_lengths_fit,
+    check_sequence_length,
+    checked_similarity,
+)
 from retraverse.matching.dynamic_length import GrowthRule, Window, dynamic_windows
+from retraverse.matching.matchers import Matcher
+from retraverse.matching.matchers import matcher as matcher_of_name
 from retraverse.matching.matches import Matches
-from retraverse.matching.pairwise import describe_query, has_descriptor, similarity_blocks
+from retraverse.matching.pairwise import (
+    describe_query,
+    has_descriptor,
+    similarity,
+    similarity_blocks,
+)
 from retraverse.matching.windows import match_diagonals, match_first_roi
 from retraverse.techniques import Descriptions, RegionalTechnique
 from retraverse.techniques.convsequential import ConvSequentialParameters
 from retraverse.types import BoolArray, FloatArray, IntArray, Progress, no_progress
 
-__all__ = ["SequenceLength", "check_sequence_length", "match", "match_similarity", "query_windows"]
+__all__ = ["SequenceLength", "match", "match_similarity", "query_windows"]
 
 SequenceLength = int | Literal["dynamic"]
 """Frames in a window: 1 for single frames, K, or each window its own."""
@@ -26,7 +44,7 @@ def match(
     route: RouteMap,
     *,
     sequence_length: SequenceLength = 10,
-    matcher: str = "mean",
+    matcher: str | Matcher = "mean",
     threshold: float | None = None,
     progress: Progress = no_progress,
 ) -> Matches:
@@ -40,9 +58,10 @@ def match(
         The map; its technique describes the query.
     sequence_length : int or "dynamic"
         1 matches single frames; K windows of K frames; ``"dynamic"`` lets every window find its
-        own length (sections 3.2.5 and 3.2.6), for techniques that offer it.
-    matcher : {"mean"}
-        How the pairs of a window become one score: their mean (equation 4.6).
+        own length (sections 3.2.5 and 3.2.6), for techniques that offer it and the mean.
+    matcher : str or Matcher
+        How the pairs become answers: a name of `matchers`, or a `matcher` with its parameters.
+        ``"mean"`` is the thesis' own (equation 4.6).
     threshold : float, optional
         Windows that score below it are answered "no match" (reference -1).
 
@@ -58,9 +77,24 @@ def match(
     Static windows: N - K + 1 answers (equation 4.5). Dynamic windows stop when every frame has
     been read, so the last frames get none. Windows whose frames gave no descriptor at all are
     answered "no match". Peak memory is bounded by blocks: the (Q, R) matrix is never whole.
+
+    That is the mean. Every other matcher takes the whole (Q, R) matrix, in which each query frame
+    has its own region of interest, also where the technique says ``roi="first"``, and answers
+    by its own rules; see there.
     """
-    check_matcher(matcher)
+    chosen = _chosen(matcher)
     queries = describe_query(query, route, progress=progress)
+    if chosen.name == "mean":
+        matches = _match_mean(queries, route, sequence_length, progress)
+    else:
+        matches = _match_matrix(queries, route, sequence_length, chosen, progress)
+    return matches if threshold is None else matches.refuse_below(threshold)
+
+
+def _match_mean(
+    queries: Descriptions, route: RouteMap, sequence_length: SequenceLength, progress: Progress
+) -> Matches:
+    """Return the mean's answers, block by block and with windows of any length."""
     lengths = query_windows(queries, route, sequence_length)
     technique = route.technique
     if _takes_first_roi(route) and lengths.max(initial=1) > 1:
@@ -69,15 +103,39 @@ def match(
     else:
         found = match_diagonals(similarity_blocks(queries, route, progress=progress), lengths)
     matches = _matches(*found, lengths, len(queries), len(route))
-    refused = matches.refuse(~_any_in_window(has_descriptor(queries), lengths))
-    return refused if threshold is None else refused.refuse_below(threshold)
+    return matches.refuse(~_any_in_window(has_descriptor(queries), lengths))
+
+
+def _match_matrix(
+    queries: Descriptions,
+    route: RouteMap,
+    sequence_length: SequenceLength,
+    chosen: Matcher,
+    progress: Progress,
+) -> Matches:
+    """Return another matcher's answers from the whole matrix of single frames."""
+    check_sequence_length(sequence_length)
+    if sequence_length == "dynamic":
+        raise ConfigError(
+            f"sequence_length 'dynamic': the matcher {chosen.name} does not offer it; expected a "
+            "whole number, or the matcher mean"
+        )
+    check_lengths_fit(len(queries), len(route), sequence_length)
+    matches = chosen.match(similarity(queries, route, progress=progress), sequence_length)
+    if not _takes_first_roi(route):
+        return matches
+    note = (
+        f"The technique's roi is 'first', which only the matcher mean can follow: {chosen.name} "
+        "took each frame's own region of interest."
+    )
+    return replace(matches, notes=(*matches.notes, note))
 
 
 def match_similarity(
     similarity: FloatArray,
     *,
     sequence_length: int = 10,
-    matcher: str = "mean",
+    matcher: str | Matcher = "mean",
     threshold: float | None = None,
 ) -> Matches:
     """Return the same answers as `match` from a ready similarity matrix (algorithms 4 and 5).
@@ -88,7 +146,7 @@ def match_similarity(
         Rows are queries, columns references, higher is more alike; finite.
     sequence_length : int
         K: frames in a window.
-    matcher : {"mean"}
+    matcher : str or Matcher
         See `match`.
     threshold : float, optional
         Windows that score below it are answered "no match".
@@ -99,21 +157,17 @@ def match_similarity(
         If the matrix does not have two axes, or holds NaN or infinity.
     InputError
         If it has fewer rows or columns than K.
+    ConfigError
+        If K is not a whole number from 1, or the matcher is unknown.
     """
-    check_matcher(matcher)
-    scores = np.ascontiguousarray(similarity, dtype=np.float32)
-    if scores.ndim != 2:
-        raise ShapeError(f"similarity: got {scores.ndim} axes, expected 2: (queries, references)")
-    if not np.isfinite(scores).all():
-        row, column = np.argwhere(~np.isfinite(scores))[0]
-        raise ShapeError(
-            f"similarity: got {scores[row, column]} at query {row}, reference {column}; "
-            "expected finite numbers"
+    chosen = _chosen(matcher)
+    scores = checked_similarity(similarity)
+    if str(sequence_length) == "dynamic":
+        raise ConfigError(
+            "sequence_length 'dynamic': a similarity matrix does not say how much the pictures "
+            "hold; expected a whole number"
         )
-    n_queries, n_references = scores.shape
-    lengths = _static_lengths(n_queries, n_references, sequence_length)
-    found = match_diagonals([(0, scores)], lengths)
-    matches = _matches(*found, lengths, n_queries, n_references)
+    matches = chosen.match(scores, sequence_length)
     return matches if threshold is None else matches.refuse_below(threshold)
 
 
@@ -132,29 +186,12 @@ def query_windows(
     return _static_lengths(len(queries), len(route), int(sequence_length))
 
 
-def check_sequence_length(sequence_length: object) -> None:
-    """Raise `ConfigError` unless it is a whole number from 1 or "dynamic"."""
-    whole = isinstance(sequence_length, (int, np.integer)) and not isinstance(sequence_length, bool)
-    if sequence_length != "dynamic" and not (whole and sequence_length >= 1):  # type: ignore[operator]
-        raise ConfigError(
-            f"sequence_length: got {sequence_length!r}, expected a whole number from 1 or 'dynamic'"
-        )
-
-
-def check_matcher(matcher: str) -> None:
-    """Raise `ConfigError` unless the matcher is known."""
-    if matcher != "mean":
-        raise ConfigError(f"unknown matcher: got {matcher!r}, expected 'mean'")
+def _chosen(matcher: str | Matcher) -> Matcher:
+    return matcher_of_name(matcher) if isinstance(matcher, str) else matcher
 
 
 def _static_lengths(n_queries: int, n_references: int, sequence_length: int) -> IntArray:
-    check_sequence_length(sequence_length)
-    for what, n_frames in (("query", n_queries), ("map", n_references)):
-        if n_frames < sequence_length:
-            raise InputError(
-                f"sequence_length {sequence_length}: the {what} has only {n_frames} frames; "
-                f"expected at least {sequence_length}, or a shorter sequence"
-            )
+    check_lengths_fit(n_queries, n_references, sequence_length)
     return np.full(n_queries - sequence_length + 1, sequence_length, np.int64)
 
 
