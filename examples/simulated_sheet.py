@@ -29,12 +29,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="a sheet of simulated pictures")
     parser.add_argument("out", type=Path, help="a .jpg or .png file")
     parser.add_argument("--places", type=int, default=4, help="rows")
+    parser.add_argument("--columns", type=int, default=len(LOOKS))
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
-    size = (len(LOOKS) * (WIDTH + GAP) - GAP, HEAD + options.places * (HEIGHT + GAP))
+    looks = list(LOOKS.items())[: options.columns]
+    size = (len(looks) * (WIDTH + GAP) - GAP, HEAD + options.places * (HEIGHT + GAP))
     sheet = Image.new("RGB", size, "white")
     draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(13)
-    for column, (label, look) in enumerate(LOOKS.items()):
+    for column, (label, look) in enumerate(looks):
         left = column * (WIDTH + GAP)
         draw.text((left + 4, 3), label, fill="black", font=font)
         drive = simulate_route(options.seed, 30 * options.places, query=look).query

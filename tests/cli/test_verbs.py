@@ -149,7 +149,7 @@ def test_demo(run: Run, tmp_path: Path) -> None:
 BAD = [
     (["compare", "nowhere", "nowhere"], "nowhere"),
     (["compare", "{reference}", "{query}", "-t", "hogg"], "did you mean 'hog'"),
-    (["compare", "{reference}", "{query}", "-t", "hog"], "does not offer it"),
+    (["compare", "{reference}", "{query}", "-t", "hog", "--every", "20"], "at least 3 frames"),
     (["compare", "{reference}", "{query}", "-k", "0"], "whole number from 1"),
     (["compare", "{reference}", "{query}", "-k", "-3"], "whole number from 1"),
     (["compare", "{reference}", "{query}", "-t", "hog", "-k", "25"], "only 24 frames"),

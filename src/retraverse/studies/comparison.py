@@ -19,6 +19,7 @@ from retraverse.matching import (
     Matches,
     SequenceLength,
     describe_query,
+    ensure_entropy,
     match,
     match_similarity,
     similarity,
@@ -100,6 +101,8 @@ def compare(
     watch = _Stopwatch()
     route = build_map(reference, plan.technique, progress=progress)
     queries = describe_query(query, route, progress=progress)
+    if plan.sequence_length == "dynamic":
+        queries = ensure_entropy(queries, query, progress=progress)
     watch.lap("describe")
     matches = match(
         queries,

@@ -14,7 +14,6 @@ from retraverse.datasets.simulated import (
     SimulatedDrive,
     SimulatedRoute,
     make_street,
-    plan_motion,
     simulate_route,
     write_drive,
 )
@@ -30,6 +29,12 @@ Route = Callable[..., SimulatedRoute]
 def plain(small_route: Route) -> SimulatedRoute:
     """Return a route without any disturbance."""
     return small_route()
+
+
+@pytest.fixture(scope="module")
+def detour() -> SimulatedRoute:
+    """Return a route whose query leaves the map for a while."""
+    return simulate_route(1, 24, motion="detour", camera=SMALL)
 
 
 def same(first: ImageArray, second: ImageArray) -> bool:
@@ -94,16 +99,15 @@ def test_a_stop_shows_the_same_picture(plain: SimulatedRoute) -> None:
     assert same(drive[i], plain.reference[round(drive.positions_m[i] / 2)])
 
 
-def test_off_the_route_is_another_street(plain: SimulatedRoute) -> None:
-    route = simulate_route(1, 24, motion="detour", camera=SMALL)
-    off = np.flatnonzero(~route.query.on_route)
+def test_off_the_route_is_another_street(plain: SimulatedRoute, detour: SimulatedRoute) -> None:
+    off = np.flatnonzero(~detour.query.on_route)
     assert len(off) > 3
-    place = route.query.motion.places_m[off[0]]
-    there = route.query[int(off[0])].astype(float)
+    place = detour.query.motion.places_m[off[0]]
+    there = detour.query[int(off[0])].astype(float)
     here = plain.reference[round(place / 2)].astype(float)
     ahead = plain.reference[round(place / 2) + 2].astype(float)
     assert np.abs(there - here).mean() > np.abs(ahead - here).mean()
-    assert all(len(route.truth(1e9)[i]) == 0 for i in off)
+    assert all(len(detour.truth(1e9)[i]) == 0 for i in off)
 
 
 # What the camera does
@@ -150,10 +154,8 @@ def test_a_plain_matcher_finds_what_is_plain(plain: SimulatedRoute, small_route:
         best = (thumbnails(route.query) @ reference.T).argmax(axis=1)
         return float(np.mean([b in true for b, true in zip(best, route.truth(2.0), strict=True)]))
 
-    hard = recovered(small_route(night=1.0, season=1.0))
     assert recovered(plain) == 1.0
-    assert hard < 0.75
-    assert hard < recovered(small_route(lateral_shift=0.5)) + 0.25
+    assert recovered(small_route(night=1.0, lateral_shift=1.0)) < 0.5
 
 
 # Truth
@@ -241,11 +243,9 @@ def test_written_files_read_back(plain: SimulatedRoute, tmp_path: Path) -> None:
     assert {row["on_route"] for row in rows} == {"true"}
 
 
-def test_off_the_route_the_table_has_no_position(tmp_path: Path) -> None:
-    motion = plan_motion("detour", length_m=24).frames()
-    drive = SimulatedDrive(simulate_route(1, 24).query.street, motion, camera=SMALL)
-    first = int(np.flatnonzero(~motion.on_route)[0])
-    folder = write_drive(drive[first - 1 : first + 1], tmp_path / "drive")
+def test_off_the_route_the_table_has_no_position(detour: SimulatedRoute, tmp_path: Path) -> None:
+    first = int(np.flatnonzero(~detour.query.on_route)[0])
+    folder = write_drive(detour.query[first - 1 : first + 1], tmp_path / "drive")
     lines = (folder / "positions.csv").read_text(encoding="utf-8").splitlines()
     assert lines[1].endswith(",true")
     assert lines[2] == "1,0001.jpg,,false"
