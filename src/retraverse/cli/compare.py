@@ -11,13 +11,15 @@ from retraverse.cli.options import (
     Aligned,
     Every,
     JsonOutput,
+    MatcherName,
+    MatcherSettings,
     Radius,
-    SequenceLengthText,
     Settings,
     SkipBad,
     TechniqueName,
     Threshold,
     TruthPath,
+    make_matcher,
     make_technique,
     read_sequence_length,
     read_truth,
@@ -40,7 +42,18 @@ def compare(
     radius: Radius = None,
     technique: TechniqueName = "convsequential",
     settings: Settings = None,
-    sequence_length: SequenceLengthText = "dynamic",
+    matcher: MatcherName = "mean",
+    matcher_settings: MatcherSettings = None,
+    sequence_length: Annotated[
+        str | None,
+        typer.Option(
+            "--sequence-length",
+            "-k",
+            help="Frames in a window: 1, a whole number, or dynamic. "
+            "[default: dynamic; 10 for matchers other than mean]",
+            show_default=False,
+        ),
+    ] = None,
     threshold: Threshold = None,
     out: Annotated[Path, typer.Option("--out", "-o", help="The report, one HTML file.")] = Path(
         "report.html"
@@ -57,7 +70,10 @@ def compare(
     check_writable_place(out)
     plan = ComparePlan(
         technique=make_technique(technique, settings),
-        sequence_length=read_sequence_length(sequence_length),
+        sequence_length=read_sequence_length(
+            sequence_length or ("dynamic" if matcher == "mean" else "10")
+        ),
+        matcher=make_matcher(matcher, matcher_settings),
         threshold=threshold,
         command=shlex.join(["retraverse", *sys.argv[1:]]),
     )

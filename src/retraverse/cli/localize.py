@@ -8,9 +8,12 @@ import typer
 from retraverse.cli.options import (
     Every,
     JsonOutput,
+    MatcherName,
+    MatcherSettings,
     SequenceLengthText,
     SkipBad,
     Threshold,
+    make_matcher,
     read_sequence_length,
 )
 from retraverse.cli.output import print_json, progress, remark
@@ -28,6 +31,8 @@ def localize(
     out: Annotated[Path, typer.Option("--out", "-o", help="The matches, CSV.")] = Path(
         "matches.csv"
     ),
+    matcher: MatcherName = "mean",
+    matcher_settings: MatcherSettings = None,
     sequence_length: SequenceLengthText = "10",
     threshold: Threshold = None,
     every: Every = 1,
@@ -45,6 +50,7 @@ def localize(
         traverse,
         loaded,
         sequence_length=read_sequence_length(sequence_length),
+        matcher=make_matcher(matcher, matcher_settings),
         threshold=threshold,
         progress=show,
     )
@@ -54,12 +60,15 @@ def localize(
         query_names=[frame.name for frame in traverse],
         reference_names=loaded.frames.names,
     )
+    for note in matches.notes:
+        remark(f"note: {note}")
     counts = {
         "matches": str(out),
         "n_queries": matches.n_queries,
         "n_answered": len(matches),
         "n_refused": int((~matches.is_match).sum()),
         "n_unanswered": matches.n_unanswered,
+        "notes": matches.notes,
     }
     if json_output:
         print_json(counts)

@@ -25,6 +25,7 @@ VERBS = (
     "localize",
     "evaluate",
     "techniques",
+    "matchers",
     "datasets simulate",
     "doctor",
 )
@@ -44,6 +45,7 @@ app.add_typer(maps.app, name="map")
 app.command("localize")(localize.localize)
 app.command("evaluate")(evaluate.evaluate)
 app.command("techniques")(listing.techniques)
+app.command("matchers")(listing.matchers)
 app.add_typer(datasets.app, name="datasets")
 app.command("doctor")(doctor.doctor)
 

@@ -10,12 +10,15 @@ from numpy.typing import NDArray
 from retraverse.datasets import GroundTruth, aligned, from_positions, ground_truth, load_positions
 from retraverse.errors import ConfigError, InputError
 from retraverse.images import Traverse
+from retraverse.matching.matchers import Matcher, matcher
 from retraverse.techniques import Technique, technique
 
 __all__ = [
     "Aligned",
     "Every",
     "JsonOutput",
+    "MatcherName",
+    "MatcherSettings",
     "Radius",
     "SequenceLengthText",
     "Settings",
@@ -23,6 +26,7 @@ __all__ = [
     "TechniqueName",
     "Threshold",
     "TruthPath",
+    "make_matcher",
     "make_technique",
     "positions_of",
     "read_sequence_length",
@@ -35,6 +39,13 @@ TechniqueName = Annotated[
 Settings = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the technique; repeatable."),
+]
+MatcherName = Annotated[str, typer.Option("--matcher", "-m", help="One of `retraverse matchers`.")]
+MatcherSettings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--matcher-set", metavar="NAME=VALUE", help="A parameter of the matcher; repeatable."
+    ),
 ]
 SequenceLengthText = Annotated[
     str,
@@ -67,13 +78,22 @@ Radius = Annotated[
 
 def make_technique(name: str, settings: list[str] | None) -> Technique:
     """Return the technique with ``name=value`` settings applied."""
+    return technique(name, **_read_settings("--set", settings))
+
+
+def make_matcher(name: str, settings: list[str] | None) -> Matcher:
+    """Return the matcher with ``name=value`` settings applied."""
+    return matcher(name, **_read_settings("--matcher-set", settings))
+
+
+def _read_settings(option: str, settings: list[str] | None) -> dict[str, str]:
     values: dict[str, str] = {}
     for setting in settings or []:
         key, separator, value = setting.partition("=")
         if not separator:
-            raise ConfigError(f"--set: got {setting!r}, expected NAME=VALUE")
+            raise ConfigError(f"{option}: got {setting!r}, expected NAME=VALUE")
         values[key.strip()] = value.strip()
-    return technique(name, **values)
+    return values
 
 
 def read_sequence_length(text: str) -> int | Literal["dynamic"]:

@@ -1,13 +1,16 @@
 """Matches as a CSV file: one row for every query frame, so that nothing is hidden.
 
-Columns: ``query, query_name, reference, reference_name, score, sequence_length, n_references``. A
-query frame that starts no window has empty cells after its name; "no match" is reference -1. The
-last column repeats the size of the map, which every judgement of the matches needs.
+Columns: ``query, query_name, reference, reference_name, score, sequence_length, n_references,
+frame_reference``. A query frame that names no window has empty cells after its name; "no match" is
+reference -1. ``n_references`` repeats the size of the map, which every judgement of the matches
+needs; ``frame_reference`` is where each single frame belongs (`Matches.frame_reference`) and may be
+missing.
 """
 
 import csv
 import io
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +29,7 @@ COLUMNS = (
     "score",
     "sequence_length",
     "n_references",
+    "frame_reference",
 )
 
 
@@ -38,6 +42,7 @@ def save_matches(
 ) -> None:
     """Write matches as CSV; the file is whole or not there."""
     answered = {int(query): window for window, query in enumerate(matches.query)}
+    frame_reference = matches.frame_reference.tolist()
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow(COLUMNS)
@@ -45,7 +50,7 @@ def save_matches(
         cells = [""] * 4
         if query in answered:
             cells = _answer_cells(matches, answered[query], reference_names)
-        writer.writerow([query, name, *cells, matches.n_references])
+        writer.writerow([query, name, *cells, matches.n_references, frame_reference[query]])
     write_whole(Path(path), text.getvalue().encode())
 
 
@@ -69,7 +74,7 @@ def load_matches(path: Path | str) -> Matches:
     if len(n_references) > 1:
         raise InputError(f"matches {path}: n_references differs between rows; joined files?")
     answered = [row for row in rows if row["reference"] != ""]
-    return Matches(
+    matches = Matches(
         query=np.array([_number(row, "query", path, int) for row in answered], np.int64),
         reference=np.array([_number(row, "reference", path, int) for row in answered], np.int64),
         score=np.array([_number(row, "score", path, float) for row in answered], np.float32),
@@ -79,6 +84,11 @@ def load_matches(path: Path | str) -> Matches:
         n_queries=len(rows),
         n_references=n_references.pop(),
     )
+    if "frame_reference" not in rows[0]:
+        return matches
+    followed = np.array([_number(row, "frame_reference", path, int) for row in rows], np.int64)
+    follows_diagonals = np.array_equal(followed, matches.frame_reference)
+    return matches if follows_diagonals else replace(matches, followed=followed)
 
 
 def _answer_cells(matches: Matches, window: int, reference_names: Sequence[str]) -> list[str]:

@@ -107,4 +107,6 @@ def length_text(record: ComparisonRecord) -> str:
     shortest, longest = int(lengths.min()), int(lengths.max())
     if shortest == longest:
         return f"K = {shortest}" if asked.isdigit() else f"{asked} K, always {shortest}"
+    if asked.isdigit():
+        return f"K = {asked}, {shortest} to {longest} frames of evidence"
     return f"{asked} K, {shortest} to {longest}"

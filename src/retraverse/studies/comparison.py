@@ -16,6 +16,7 @@ from retraverse.errors import InputError
 from retraverse.images import Traverse
 from retraverse.maps import build_map
 from retraverse.matching import (
+    Matcher,
     Matches,
     SequenceLength,
     describe_query,
@@ -24,6 +25,7 @@ from retraverse.matching import (
     match_similarity,
     similarity,
 )
+from retraverse.matching.matchers import describe_matcher
 from retraverse.metrics import Evaluation, evaluate, t_vpr
 from retraverse.studies.comparison_record import (
     ComparisonRecord,
@@ -51,7 +53,7 @@ class ComparePlan:
 
     technique: Technique
     sequence_length: SequenceLength = "dynamic"
-    matcher: str = "mean"
+    matcher: str | Matcher = "mean"
     threshold: float | None = None
     command: str = ""
     """The command line that repeats the comparison, for the record."""
@@ -230,7 +232,7 @@ def _provenance(plan: ComparePlan) -> Provenance:
         technique_version=plan.technique.version,
         parameters=_parameters(plan.technique),
         sequence_length=str(plan.sequence_length),
-        matcher=plan.matcher,
+        matcher=_matcher_text(plan.matcher),
         threshold=plan.threshold,
         kernel_backend=kernels.backend(),
         python=platform.python_version(),
@@ -239,6 +241,10 @@ def _provenance(plan: ComparePlan) -> Provenance:
         machine=f"{platform.machine()}, {platform.system()}",
         seed=SEED,
     )
+
+
+def _matcher_text(matcher: str | Matcher) -> str:
+    return matcher if isinstance(matcher, str) else describe_matcher(matcher)
 
 
 def _parameters(technique: Technique) -> Mapping[str, Any]:
@@ -255,11 +261,14 @@ def _notes(
     query: Traverse,
 ) -> tuple[str, ...]:
     """Return what a reader must know to trust the numbers, one sentence each."""
-    notes = []
+    notes = list(matches.notes)
+    takes_mean = _matcher_text(plan.matcher) == "mean"
     if matches.n_unanswered:
+        name = "start" if takes_mean else "are the middle of"
+        ends = "the windows end where the drive ends" if takes_mean else "windows need both sides"
         notes.append(
-            f"{matches.n_unanswered} of {matches.n_queries} query frames start no window and got "
-            "no answer: the windows end where the drive ends."
+            f"{matches.n_unanswered} of {matches.n_queries} query frames {name} no window and got "
+            f"no answer: {ends}."
         )
     n_refused = int((~matches.is_match).sum())
     if n_refused:
@@ -270,7 +279,7 @@ def _notes(
                 f"{len(traverse.skipped)} pictures of {traverse.name} could not be read "
                 "and were left out."
             )
-    if getattr(plan.technique.parameters, "roi", "each") == "first":
+    if takes_mean and getattr(plan.technique.parameters, "roi", "each") == "first":
         notes.append(
             "Windows take the region of interest of their first frame; the similarity matrix and "
             "the results at fixed lengths take each frame's own."

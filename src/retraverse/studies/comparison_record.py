@@ -100,7 +100,7 @@ class Provenance:
     sequence_length: str
     """``"dynamic"`` or the fixed K, as text."""
     matcher: str
-    """Name of the sequence matcher."""
+    """Name of the sequence matcher, with the parameters that are not at their defaults."""
     threshold: float | None
     """Scores below it are answered "no match"; None = every window gets its best."""
     kernel_backend: str

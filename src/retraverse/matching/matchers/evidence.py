@@ -23,6 +23,8 @@ deviations say no more than "certainly"."""
 FLAT = 1e-6
 """A row that nowhere differs from its mean by more than this, relatively, is constant up to
 rounding."""
+SMALLEST = 1e-37
+"""Differences below this are lost in float32."""
 
 
 def standardise(similarity: FloatArray) -> FloatArray:
@@ -32,7 +34,7 @@ def standardise(similarity: FloatArray) -> FloatArray:
         mean = row.mean(dtype=np.float64)
         np.subtract(row, np.float32(mean), out=out)
         largest = float(np.abs(out).max())
-        if largest <= FLAT * abs(mean):
+        if largest <= FLAT * abs(mean) + SMALLEST:
             out[:] = 0
             continue
         out *= np.float32(1 / largest)  # squares of any scale of scores then fit
