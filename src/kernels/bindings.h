@@ -7,3 +7,5 @@
 void bind_regional(nanobind::module_ &module);
 void bind_encoding(nanobind::module_ &module);
 void bind_diagonal(nanobind::module_ &module);
+void bind_thumbnails(nanobind::module_ &module);
+void bind_keypoints(nanobind::module_ &module);

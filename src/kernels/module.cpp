@@ -6,4 +6,6 @@ NB_MODULE(_native, module) {
     bind_regional(module);
     bind_encoding(module);
     bind_diagonal(module);
+    bind_thumbnails(module);
+    bind_keypoints(module);
 }

@@ -2,7 +2,8 @@
 
 Every function here runs compiled code where it was built, else NumPy with the same result.
 Contents: how kernels run (`backend`), regional matching (`regional`), regional HOG and local
-entropy (`encoding`), sequence scores along the diagonals of a similarity matrix (`diagonal`).
+entropy (`encoding`), sequence scores along the diagonals of a similarity matrix (`diagonal`),
+differences of thumbnails (`thumbnails`), matching of binary keypoints (`keypoints`).
 """
 
 from retraverse.kernels.backend import backend, default_threads, instruction_sets
@@ -14,7 +15,9 @@ from retraverse.kernels.diagonal import (
     diagonal_scores,
 )
 from retraverse.kernels.encoding import local_entropy, region_entropies, regional_hog
+from retraverse.kernels.keypoints import keypoint_matches
 from retraverse.kernels.regional import quantise_regions, regional_scores
+from retraverse.kernels.thumbnails import thumbnail_differences
 
 __all__ = [
     "BestDiagonals",
@@ -25,9 +28,11 @@ __all__ = [
     "default_threads",
     "diagonal_scores",
     "instruction_sets",
+    "keypoint_matches",
     "local_entropy",
     "quantise_regions",
     "region_entropies",
     "regional_hog",
     "regional_scores",
+    "thumbnail_differences",
 ]
