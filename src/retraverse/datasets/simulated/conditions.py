@@ -42,7 +42,7 @@ class Disturbances:
     rain: float = 0.0
     """Overcast sky, wet dark road, streaks; no direct sun, so no shadows."""
     vibration: float = 0.0
-    """Heading jitter (standard deviation 0.75 degrees), pitch jitter, weaving in the lane (0.3 m)."""
+    """Heading (standard deviation 0.75 degrees) and pitch jitter, weaving in the lane (0.3 m)."""
     speed_change: float = 0.0
     """Smoothly varying speed; at 1 between half and twice the nominal speed."""
     stops: float = 0.0
