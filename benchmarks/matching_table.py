@@ -30,7 +30,7 @@ WHOLE_LINE = "whole line"
 TECHNIQUES: list[tuple[str, dict[str, Any]]] = [
     ("hog", {"form": "chapter6"}),
     ("hog", {"form": "chapter7", "resolution": 64}),
-    # ("gist", {}),
+    ("gist", {}),
     ("orb", {}),
     ("sad", {}),
     ("patchnorm", {}),

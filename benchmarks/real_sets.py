@@ -31,8 +31,8 @@ RUNS: list[tuple[str, dict[str, Any], list[int | str]]] = [
 def main() -> None:
     for drives in real_sets(data_folder()):
         print(
-            f"\n**{drives.name}**: {len(drives.query)} queries, {len(drives.reference)} references, "
-            f"{drives.truth.description}\n"
+            f"\n**{drives.name}**: {len(drives.query)} queries, "
+            f"{len(drives.reference)} references, {drives.truth.description}\n"
         )
         print(f"| {' | '.join(COLUMNS)} |\n|{'---|' * len(COLUMNS)}")
         for technique_name, parameters, lengths in RUNS:

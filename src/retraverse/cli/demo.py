@@ -20,9 +20,9 @@ from retraverse.techniques import technique as make_technique
 __all__ = ["demo"]
 
 QUERY = Disturbances(
-    lateral_shift=0.7, season=0.95, night=0.25, traffic=0.9, vibration=0.5, speed_change=0.3
+    lateral_shift=0.8, season=0.95, night=0.3, traffic=0.9, vibration=0.6, speed_change=0.4
 )
-"""A late winter afternoon: snow, 1.1 m further left, dense traffic, an unsteady camera and speed.
+"""A late winter afternoon: snow, 1.3 m further left, dense traffic, an unsteady camera and speed.
 
 Hard enough that single frames go wrong where windows of frames do not, and that some windows
 still do.

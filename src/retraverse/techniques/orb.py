@@ -70,7 +70,7 @@ class Orb:
     """
 
     name: ClassVar[str] = "orb"
-    summary: ClassVar[str] = "matched corners: bears rotation and shift, finds none in tiny pictures"
+    summary: ClassVar[str] = "matched corners: bears rotation and shift, none in tiny pictures"
     citation: ClassVar[str] = (
         "Rublee, Rabaud, Konolige, Bradski: ORB: an efficient alternative to SIFT or SURF, "
         "ICCV 2011"
@@ -106,8 +106,8 @@ class Orb:
             references.arrays["n_keypoints"],
             max_distance=self.parameters.max_distance,
         )
-        share: FloatArray = matches.astype(np.float32) / np.maximum(counts, 1)[:, np.newaxis]
-        return share.astype(np.float32, copy=False)
+        share = matches / np.maximum(counts, 1)[:, np.newaxis]
+        return np.asarray(share, dtype=np.float32)
 
     def _resize(self, image: ImageArray) -> ImageArray:
         size = self.parameters.resolution

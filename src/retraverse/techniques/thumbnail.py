@@ -124,7 +124,7 @@ class Sad(_Thumbnails):
     """
 
     name: ClassVar[str] = "sad"
-    summary: ClassVar[str] = "tiny pictures, pixel by pixel: the simplest there is; wants same light"
+    summary: ClassVar[str] = "tiny pictures compared pixel by pixel: wants the same light"
     citation: ClassVar[str] = (
         "Milford, Wyeth: SeqSLAM: Visual Route-Based Navigation for Sunny Summer Days and Stormy "
         "Winter Nights, ICRA 2012"
