@@ -1,4 +1,3 @@
-<<<<<<< HEAD
 """SeqSLAM and OpenSeqSLAM2 against the published programs, run under Octave on Corridor.
 
 Goldens: openseqslam_octave_corridor.npz (difference matrix D, enhanced DD, matches) and
@@ -7,16 +6,6 @@ with references in rows and indices from 1. OpenSeqSLAM2's search ran on the sam
 """
 
 from collections.abc import Callable, Mapping
-=======
-"""SeqSLAM's thumbnails and difference matrix of Corridor against the original program.
-
-Golden: openseqslam_octave_corridor.npz, written by the original OpenSeqSLAM under GNU Octave.
-Its own 64 x 32 grey arrays are the input, since no other library repeats its resizing; its
-matrix is (references, queries), of saturating differences divided by the number of references.
-"""
-
-from collections.abc import Callable
->>>>>>> m1
 from pathlib import Path
 from typing import Any
 
@@ -24,20 +13,15 @@ import numpy as np
 import pytest
 
 import retraverse as rt
-<<<<<<< HEAD
 from retraverse.matching.matchers.contrast import enhance_contrast
 from retraverse.matching.matchers.openseqslam2 import OpenSeqSlam2
 from retraverse.matching.matchers.seqslam import SeqSlam
 from retraverse.types import FloatArray
-=======
-from retraverse.techniques import Descriptions
->>>>>>> m1
 
 Shared = Callable[[str], Path]
 
 
 @pytest.fixture(scope="module")
-<<<<<<< HEAD
 def openseqslam(shared: Shared) -> Mapping[str, Any]:
     return dict(np.load(shared("golden/openseqslam_octave_corridor.npz")))
 
@@ -106,32 +90,3 @@ def test_openseqslam2_accuracy_and_uniqueness(shared: Shared, similarity: FloatA
     assert int(kept.is_match.sum()) == 42
     correct = truth.is_correct(kept.query, kept.reference)[kept.is_match]
     assert correct.mean() == pytest.approx(0.810, abs=0.005)
-=======
-def golden(shared: Shared) -> dict[str, Any]:
-    return dict(np.load(shared("golden/openseqslam_octave_corridor.npz")))
-
-
-def described(technique: Any, pictures: Any) -> Descriptions:
-    """Return the descriptions of (32, 64, N) grey levels, rounded as MATLAB does."""
-    rounded = np.floor(np.moveaxis(pictures, 2, 0) + 0.5).astype(np.uint8)
-    return Descriptions.stack(map(technique.describe, rounded), technique.layout)
-
-
-@pytest.mark.parametrize("drive", ["query", "ref"])
-def test_normalised_thumbnails_are_the_same(golden: dict[str, Any], drive: str) -> None:
-    ours = described(rt.technique("patchnorm"), golden[f"{drive}_32x64xN"]).descriptor
-    theirs = golden[f"{drive}_pre"].reshape(64, 32, -1)  # column by column
-    np.testing.assert_array_equal(ours.reshape(-1, 32, 64), theirs.transpose(2, 1, 0))
-
-
-def test_difference_matrix(golden: dict[str, Any]) -> None:
-    technique: Any = rt.technique("patchnorm", difference="saturating")
-    queries = described(technique, golden["query_32x64xN"])
-    references = described(technique, golden["ref_32x64xN"])
-    sums = technique.differences(queries, references)
-    np.testing.assert_allclose(sums / len(references), golden["D"].T, rtol=1e-4)
-    # Matchers see similarities: the same matrix comes back from them.
-    similarity = technique.similarity(queries, references)
-    distances = (1 - similarity.astype(np.float64)) * 2048 * 16 / len(references)
-    np.testing.assert_allclose(distances, golden["D"].T, rtol=1e-4)
->>>>>>> m1
