@@ -104,7 +104,9 @@ def test_every_frame_has_an_answer_of_its_own(matcher: rt.Matcher) -> None:
 
 def test_a_drive_at_the_maps_speed_is_followed(matcher: rt.Matcher) -> None:
     if getattr(matcher.parameters, "search", "") == "cone":
-        pytest.skip("the cone counts hits of locally enhanced minima: noise of this size hides them")
+        pytest.skip(
+            "the cone counts hits of locally enhanced minima: noise of this size hides them"
+        )
     if getattr(matcher.parameters, "scope", "") == "global":
         pytest.skip("a part of the map is no drive from end to end")
     off = np.abs(answers(matcher, drive()).frame_reference - np.arange(10, 70))
