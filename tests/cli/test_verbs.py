@@ -121,6 +121,36 @@ def test_techniques_lists_every_parameter(run: Run) -> None:
     assert "max_sequence_length" in run("techniques").stdout
 
 
+def test_matchers_say_what_they_cost_and_assume(run: Run) -> None:
+    listed = {entry["name"]: entry for entry in json.loads(run("matchers", "--json").stdout)}
+    assert set(listed) >= {"mean", "seqslam", "openseqslam2", "dtw", "hmm", "graph", "auto"}
+    assert all(entry["cost"] and entry["assumes"] for entry in listed.values())
+    assert listed["hmm"]["frame_by_frame"]
+    text = run("matchers").stdout
+    assert "slope_aware | original" in text
+    assert "assumes: " in text
+
+
+def test_compare_and_localize_by_another_matcher(
+    run: Run, drives: tuple[Path, Path], tmp_path: Path
+) -> None:
+    words = ["--matcher", "seqslam", "--matcher-set", "index=original", "-t", "hog", "--json"]
+    done = run("compare", *drives, "--radius", 4, *words)
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    assert result["provenance"]["matcher"] == "seqslam(index=original)"
+    assert result["provenance"]["sequence_length"] == "10"
+    assert result["n_answered"] == 14
+    automatic = json.loads(run("compare", *drives, "-t", "hog", "-m", "auto", "--json").stdout)
+    assert automatic["notes"][0].startswith("auto picked ")
+    run("map", "build", drives[0], "--out", "route.map", "-t", "hog")
+    located = run("localize", "route.map", drives[1], "-k", 4, "-m", "dtw", "--json")
+    assert json.loads(located.stdout)["n_answered"] == 24
+    with (tmp_path / "matches.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert all(row["frame_reference"] == row["reference"] for row in rows)
+
+
 def test_doctor(run: Run) -> None:
     assert json.loads(run("doctor", "--json").stdout)["kernels"] in ("native", "numpy")
 
@@ -163,6 +193,10 @@ BAD = [
     ),
     (["map", "info", "{reference}"], "not a route map"),
     (["localize", "{reference}", "{query}"], "not a route map"),
+    (["compare", "{reference}", "{query}", "-m", "dwt"], "did you mean 'dtw'"),
+    (["compare", "{reference}", "{query}", "-m", "hmm", "-k", "dynamic"], "does not offer it"),
+    (["compare", "{reference}", "{query}", "--matcher-set", "x"], "--matcher-set: got 'x'"),
+    (["compare", "{reference}", "{query}", "-m", "hmm", "--matcher-set", "jump=2"], "1e-12 to 0.4"),
     (["evaluate", "none.csv", "--aligned", "2"], "no such file"),
     (["evaluate", "{reference}/positions.csv", "--aligned", "2"], "column"),
     (["datasets", "simulate", "{reference}/..", "--frames", "5"], "folder"),

@@ -166,9 +166,50 @@ def test_matrices_that_make_no_sense(
         rt.match_similarity(matrix, sequence_length=K)
 
 
-def test_unknown_matcher() -> None:
+def test_unknown_matcher(route: rt.RouteMap) -> None:
+    with pytest.raises(ConfigError, match=r"mean.*did you mean 'dtw'"):
+        rt.match_similarity(np.zeros((3, 3), np.float32), sequence_length=1, matcher="dwt")
     with pytest.raises(ConfigError, match="unknown matcher"):
-        rt.match_similarity(np.zeros((3, 3), np.float32), sequence_length=1, matcher="nearest")
+        rt.match(rt.open_traverse(street(20)), route, sequence_length=1, matcher="dwt")
+
+
+@pytest.mark.parametrize("name", [info.name for info in rt.matchers()])
+def test_every_matcher_finds_the_same_drive(route: rt.RouteMap, name: str) -> None:
+    query = rt.open_traverse(street(20))
+    matches = rt.match(query, route, sequence_length=4, matcher=name)
+    again = rt.match_similarity(rt.similarity(query, route), sequence_length=4, matcher=name)
+    np.testing.assert_array_equal(matches.reference, again.reference)
+    np.testing.assert_array_equal(matches.score, again.score)
+    assert (np.abs(matches.frame_reference - np.arange(20)) <= 1).mean() > 0.8
+    refused = rt.match(query, route, sequence_length=4, matcher=rt.matcher(name), threshold=1e9)
+    assert (refused.frame_reference == -1).all()
+
+
+def test_only_the_mean_takes_dynamic_windows() -> None:
+    route = regional_route(street(12))
+    with pytest.raises(ConfigError, match="the matcher hmm does not offer it"):
+        rt.match(rt.open_traverse(street(12)), route, sequence_length="dynamic", matcher="hmm")
+
+
+def test_other_matchers_say_whose_region_of_interest_they_took() -> None:
+    query = rt.open_traverse(street(12))
+    for roi, expected in (("first", 1), ("each", 0)):
+        route = regional_route(street(12), roi=roi)
+        matches = rt.match(query, route, sequence_length=3, matcher="dtw")
+        assert len([note for note in matches.notes if "region of interest" in note]) == expected
+        assert rt.match(query, route, sequence_length=3).notes == ()
+
+
+def test_black_frames_are_bridged_or_refused(route: rt.RouteMap) -> None:
+    frames = street(20)
+    frames[9] = np.zeros_like(frames[9])
+    query = rt.open_traverse(frames)
+    path = rt.match(query, route, sequence_length=4, matcher="dtw").frame_reference
+    assert abs(path[9] - 9) <= 1
+    black = rt.open_traverse([np.zeros((96, 96), np.uint8)] * 12)
+    for name in ("seqslam", "openseqslam2", "dtw", "hmm", "graph"):
+        matches = rt.match(black, route, sequence_length=4, matcher=name)
+        assert (matches.frame_reference == -1).all()
 
 
 @given(seed=st.integers(0, 2**32 - 1), K=st.integers(1, 6), gap=st.integers(0, 20))

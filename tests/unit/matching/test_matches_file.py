@@ -1,5 +1,6 @@
 """Matches survive the way through a CSV file; a file that is none is refused with its line."""
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +52,23 @@ def test_round_trip(
     for name in ("query", "reference", "score", "sequence_length"):
         np.testing.assert_array_equal(getattr(loaded, name), getattr(matches, name))
     assert (loaded.n_queries, loaded.n_references) == (n_queries, n_references)
+
+
+def test_where_each_frame_belongs_is_kept(tmp_path: Path) -> None:
+    matches = Matches(
+        query=np.array([1, 2]),
+        reference=np.array([4, 5]),
+        score=np.array([1, 2], np.float32),
+        sequence_length=np.array([3, 3]),
+        n_queries=4,
+        n_references=9,
+        followed=np.array([3, 4, 5, 7]),
+    )
+    save(matches, tmp_path / "matches.csv")
+    assert load_matches(tmp_path / "matches.csv").frame_reference.tolist() == [3, 4, 5, 7]
+    diagonals = dataclasses.replace(matches, followed=None)
+    save(diagonals, tmp_path / "matches.csv")
+    assert load_matches(tmp_path / "matches.csv").followed is None
 
 
 @pytest.mark.parametrize(

@@ -24,8 +24,8 @@ __all__ = ["Auto", "AutoParameters", "SpeedProfile", "speed_profile"]
 SHORTEST_STRETCH = 20
 """Speeds are read over at least so many frames: where the path is two frames off at each end, the
 speed is then 0.2 off."""
-STEADY_SPEEDS = 0.8, 1.2
-"""Speeds that SeqSLAM looks for."""
+STEADY_SPEEDS = 0.75, 1.25
+"""Speeds that SeqSLAM looks for, and one frame in a stretch of 20 on either side."""
 MAP_SPEED = 0.1
 """Median speeds this near to 1 are the map's: a window of 10 drifts by less than one frame."""
 
@@ -38,7 +38,7 @@ class AutoParameters:
         0.3, "share of frames whose place must be known, else the mean is taken"
     )
     steady_share: float = parameter(
-        0.8, "share of stretches at speeds of 0.8 to 1.2 from which a drive is steady"
+        0.8, "share of stretches at speeds of about 0.8 to 1.2 from which a drive is steady"
     )
     absent_share: float = parameter(
         0.05, "share of frames in long absences from which a drive leaves the map"
@@ -125,8 +125,8 @@ class Auto:
             return _any_speed(), f"the drive is off the map for {profile.absent:.0%} of its frames"
         if profile.steady < limits.steady_share:
             return _any_speed(), (
-                f"the speed changes: only {profile.steady:.0%} of the stretches run at 0.8 to 1.2 "
-                "times the map's"
+                f"the speed changes: only {profile.steady:.0%} of the stretches run at about "
+                "0.8 to 1.2 times the map's"
             )
         if abs(profile.median - 1) > MAP_SPEED:
             return SeqSlam(), f"the speed is a steady {profile.median:.2f} times the map's"
