@@ -7,19 +7,16 @@ numbers on it are thumbnail numbers, never the published set's. Intervals: 95 %,
 windows, seed 0.
 """
 
-import sys
-from pathlib import Path
 from typing import Any
+
+from _real_sets import RealSet, data_folder, real_sets
 
 import retraverse as rt
 from retraverse.matching import describe_query
 
-SETS: dict[str, tuple[str, str, int, int]] = {
-    "corridor": ("reference", "query", 1, 2),
-    "stromovka": ("autumn", "snow", 1, 2),
-    "gardens_point_thumbnails": ("reference", "query", 1, 2),
-    "nordland_64x32": ("summer", "winter", 20, 1),
-}
+COLUMNS = (
+    "technique", "parameters", "K", "answered", "accuracy", "95 %", "of all", "AUC", "AUC single",
+)  # fmt: skip
 RUNS: list[tuple[str, dict[str, Any], list[int | str]]] = [
     ("hog", {"form": "vprbench"}, [1, 10]),
     ("hog", {"form": "chapter6"}, [1, 10]),
@@ -32,39 +29,29 @@ RUNS: list[tuple[str, dict[str, Any], list[int | str]]] = [
 
 
 def main() -> None:
-    data = Path(sys.argv[1] if len(sys.argv) > 1 else "../shared/data")
-    for name, (reference_folder, query_folder, every, tolerance) in SETS.items():
-        if not (data / name).is_dir():
-            print(f"\n{name}: not here")
-            continue
-        reference = rt.open_traverse(data / name / reference_folder, every=every)
-        query = rt.open_traverse(data / name / query_folder, every=every)
-        truth = rt.aligned(len(query), len(reference), tolerance, every=every)
-        print(f"\n**{name}**: {len(query)} queries, {len(reference)} references, "
-              f"{truth.description}\n")  # fmt: skip
+    for drives in real_sets(data_folder()):
         print(
-            "| technique | parameters | K | answered | accuracy | 95 % | of all | AUC | AUC single |"
+            f"\n**{drives.name}**: {len(drives.query)} queries, "
+            f"{len(drives.reference)} references, {drives.truth.description}\n"
         )
-        print("|---|---|---|---|---|---|---|---|---|")
+        print(f"| {' | '.join(COLUMNS)} |\n|{'---|' * len(COLUMNS)}")
         for technique_name, parameters, lengths in RUNS:
-            print_rows(query, reference, truth, technique_name, parameters, lengths)
+            print_rows(drives, technique_name, parameters, lengths)
 
 
 def print_rows(
-    query: rt.Traverse,
-    reference: rt.Traverse,
-    truth: rt.GroundTruth,
+    drives: RealSet,
     technique_name: str,
     parameters: dict[str, Any],
     lengths: list[int | str],
 ) -> None:
     """Print one row for each sequence length of one technique."""
-    route = rt.build_map(reference, rt.technique(technique_name, **parameters))
-    queries = describe_query(query, route)
+    route = rt.build_map(drives.reference, rt.technique(technique_name, **parameters))
+    queries = describe_query(drives.query, route)
     settings = ", ".join(f"{key}={value}" for key, value in parameters.items())
     for length in lengths:
         matches = rt.match(queries, route, sequence_length=length)  # type: ignore[arg-type]
-        result = rt.evaluate(matches, truth)
+        result = rt.evaluate(matches, drives.truth)
         low, high = result.accuracy_interval
         shown = (
             f"dynamic, mean {matches.sequence_length.mean():.1f}" if length == "dynamic" else length

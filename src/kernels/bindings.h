@@ -11,3 +11,5 @@ void bind_dtw(nanobind::module_ &module);
 void bind_states(nanobind::module_ &module);
 void bind_graph(nanobind::module_ &module);
 void bind_trajectories(nanobind::module_ &module);
+void bind_thumbnails(nanobind::module_ &module);
+void bind_keypoints(nanobind::module_ &module);

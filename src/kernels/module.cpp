@@ -10,4 +10,6 @@ NB_MODULE(_native, module) {
     bind_states(module);
     bind_graph(module);
     bind_trajectories(module);
+    bind_thumbnails(module);
+    bind_keypoints(module);
 }

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -81,7 +82,7 @@ def test_map_localize_evaluate(run: Run, drives: tuple[Path, Path], tmp_path: Pa
     assert again.returncode == 2
     assert again.stderr.count("\n") == 1
     info = json.loads(run("map", "info", "route.map", "--json").stdout)
-    assert info["frames"] == 24
+    assert info["n_frames"] == 24
     located = run("localize", "route.map", query, "-k", 3, "--json")
     assert located.returncode == 0, located.stderr
     with (tmp_path / "matches.csv").open(newline="") as file:
@@ -101,7 +102,7 @@ def test_map_localize_evaluate(run: Run, drives: tuple[Path, Path], tmp_path: Pa
     assert set(numbers["definitions"]) >= {"accuracy", "auc", "r_p100"}
     extended = run("map", "extend", "route.map", query, "--json")
     assert extended.returncode == 0, extended.stderr
-    assert json.loads(extended.stdout)["frames"] == 48
+    assert json.loads(extended.stdout)["n_frames"] == 48
 
 
 def test_localize_dynamic(run: Run, drives: tuple[Path, Path], tmp_path: Path) -> None:
@@ -178,7 +179,7 @@ def test_demo(run: Run, tmp_path: Path) -> None:
 BAD = [
     (["compare", "nowhere", "nowhere"], "nowhere"),
     (["compare", "{reference}", "{query}", "-t", "hogg"], "did you mean 'hog'"),
-    (["compare", "{reference}", "{query}", "-t", "hog"], "does not offer it"),
+    (["compare", "{reference}", "{query}", "-t", "hog", "--every", "20"], "at least 3 frames"),
     (["compare", "{reference}", "{query}", "-k", "0"], "whole number from 1"),
     (["compare", "{reference}", "{query}", "-k", "-3"], "whole number from 1"),
     (["compare", "{reference}", "{query}", "-t", "hog", "-k", "25"], "only 24 frames"),
@@ -186,16 +187,19 @@ BAD = [
     (["compare", "{reference}", "{query}", "--set", "roi=last"], "'first', 'each'"),
     (["compare", "{reference}", "{query}", "--set", "roi_entropy=0.8"], "0.7925"),
     (["compare", "{reference}", "{query}", "--aligned", "2", "--radius", "3"], "--aligned and"),
-    (["compare", "{reference}", "{query}", "-t", "hog", "-k", "1", "-o", "no/where.html"], "no"),
     (["compare", "{reference}", "{query}", "-m", "dwt"], "did you mean 'dtw'"),
     (["compare", "{reference}", "{query}", "-m", "hmm", "-k", "dynamic"], "does not offer it"),
     (["compare", "{reference}", "{query}", "--matcher-set", "x"], "--matcher-set: got 'x'"),
     (["compare", "{reference}", "{query}", "-m", "hmm", "--matcher-set", "jump=2"], "1e-12 to 0.4"),
-    (["map", "info", "{reference}"], "map"),
-    (["localize", "{reference}", "{query}"], "map"),
+    (
+        ["compare", "{reference}", "{query}", "-t", "hog", "-k", "1", "-o", "no/where.html"],
+        "does not exist",
+    ),
+    (["map", "info", "{reference}"], "not a route map"),
+    (["localize", "{reference}", "{query}"], "not a route map"),
     (["evaluate", "none.csv", "--aligned", "2"], "no such file"),
     (["evaluate", "{reference}/positions.csv", "--aligned", "2"], "column"),
-    (["datasets", "simulate", "{reference}"], "folder"),
+    (["datasets", "simulate", "{reference}/..", "--frames", "5"], "folder"),
 ]
 
 
@@ -222,8 +226,6 @@ def test_wrong_option_is_the_users_mistake(run: Run) -> None:
 def test_bad_picture_is_named_or_skipped(
     run: Run, drives: tuple[Path, Path], tmp_path: Path
 ) -> None:
-    import shutil
-
     damaged = tmp_path.parent / f"{tmp_path.name}-damaged"
     shutil.copytree(drives[1], damaged)
     picture = damaged / "0007.jpg"

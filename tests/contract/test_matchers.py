@@ -63,7 +63,7 @@ def answers(matcher: rt.Matcher, similarity: Any, sequence_length: int = K) -> r
 
 def test_listing_says_what_it_is() -> None:
     assert {info.name for info in rt.matchers()} == {
-        "auto", "dtw", "graph", "hmm", "mean", "openseqslam2", "seqslam",
+        "auto", "balanced", "dtw", "graph", "hmm", "mean", "openseqslam2", "seqslam",
     }  # fmt: skip
     for info in rt.matchers():
         assert info.summary
@@ -257,7 +257,7 @@ def run_online(matcher: rt.Matcher, scores: FloatArray) -> list[Answer]:
 
 
 def test_frame_by_frame_gives_the_same_answers(matcher: rt.Matcher) -> None:
-    needs_all = getattr(matcher.parameters, "decode", "") in ("viterbi", "smooth", "whole")
+    needs_all = {"viterbi", "smooth", "whole", "drive"} & set(vars(matcher.parameters).values())
     if needs_all or not info_of(matcher).frame_by_frame:
         with pytest.raises(ConfigError, match="needs the whole drive"):
             matcher.online(80, K)

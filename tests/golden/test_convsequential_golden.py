@@ -13,7 +13,7 @@ import pytest
 
 import retraverse as rt
 from retraverse.matching import GrowthRule, describe_query, dynamic_windows
-from retraverse.matching.match_traverse import Overlap
+from retraverse.matching.calibrated_length import Overlap
 from retraverse.techniques import Descriptions
 from retraverse.types import Array
 

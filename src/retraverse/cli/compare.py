@@ -25,9 +25,11 @@ from retraverse.cli.options import (
     read_truth,
 )
 from retraverse.cli.output import print_json, progress, remark
+from retraverse.files import check_writable_place
 from retraverse.images import Traverse, open_traverse
 from retraverse.studies import ComparePlan, ComparisonRecord
 from retraverse.studies import compare as compare_traverses
+from retraverse.types import Progress
 
 __all__ = ["compare", "summarise"]
 
@@ -65,6 +67,7 @@ def compare(
     The report is one HTML page that opens without network: matched path, scores, pictures side
     by side, times, and, where the truth is known, accuracy and precision.
     """
+    check_writable_place(out)
     plan = ComparePlan(
         technique=make_technique(technique, settings),
         sequence_length=read_sequence_length(
@@ -91,18 +94,20 @@ def compare(
         ),
         progress=show,
     )
-    write_report(record, out, reference_traverse, query_traverse)
+    write_report(record, out, reference_traverse, query_traverse, show)
     if json_output:
         print_json(summarise(record, out))
     else:
         print_summary(record, out)
 
 
-def write_report(record: ComparisonRecord, out: Path, reference: Traverse, query: Traverse) -> None:
+def write_report(
+    record: ComparisonRecord, out: Path, reference: Traverse, query: Traverse, show: Progress
+) -> None:
     """Write the report of a comparison."""
     from retraverse.reports import write_comparison_report
 
-    write_comparison_report(record, out, reference=reference, query=query)
+    write_comparison_report(record, out, reference=reference, query=query, progress=show)
 
 
 def print_summary(record: ComparisonRecord, out: Path) -> None:

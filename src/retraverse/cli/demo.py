@@ -20,9 +20,13 @@ from retraverse.techniques import technique as make_technique
 __all__ = ["demo"]
 
 QUERY = Disturbances(
-    lateral_shift=0.5, season=0.9, night=0.15, traffic=0.6, vibration=0.3, speed_change=0.1
+    lateral_shift=0.8, season=0.95, night=0.3, traffic=0.9, vibration=0.6, speed_change=0.4
 )
-"""A winter drive at half a lane's offset in the afternoon, with traffic."""
+"""A late winter afternoon: snow, 1.3 m further left, dense traffic, an unsteady camera and speed.
+
+Hard enough that single frames go wrong where windows of frames do not, and that some windows
+still do.
+"""
 RADIUS_M = 4.0
 MARKER = ".retraverse-demo"
 
@@ -41,7 +45,7 @@ def demo(
     show = progress()
     route = simulate_route(seed, frames, query=QUERY)
     print(f"a street with seed {seed}, driven in summer ({len(route.reference)} frames) and in")
-    print(f"winter, half a lane further left, with traffic ({len(route.query)} frames)")
+    print(f"snow at the end of the day, further left, in traffic ({len(route.query)} frames)")
     folders = [
         write_drive(route.reference, out / "summer", progress=show),
         write_drive(route.query, out / "winter", progress=show),
@@ -54,7 +58,7 @@ def demo(
         make_technique(technique), read_sequence_length(sequence_length), command=command
     )
     record = compare_traverses(reference, query, plan, truth, progress=show)
-    write_report(record, out / "report.html", reference, query)
+    write_report(record, out / "report.html", reference, query, show)
     print_summary(record, out / "report.html")
     print("open the report in a browser; the same on your own pictures:")
     print("  retraverse compare FIRST_DRIVE SECOND_DRIVE")

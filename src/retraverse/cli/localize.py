@@ -17,6 +17,7 @@ from retraverse.cli.options import (
     read_sequence_length,
 )
 from retraverse.cli.output import print_json, progress, remark
+from retraverse.files import check_writable_place
 from retraverse.images import open_traverse
 from retraverse.maps import load_map
 from retraverse.matching import match, save_matches
@@ -39,6 +40,7 @@ def localize(
     json_output: JsonOutput = False,
 ) -> None:
     """Locate a drive on a map and write the matches as CSV."""
+    check_writable_place(out)
     show = progress()
     loaded = load_map(route, progress=show)
     traverse = open_traverse(query, every=every, skip_bad=skip_bad, progress=show)

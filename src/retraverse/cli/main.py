@@ -6,6 +6,7 @@ Exit codes: 0 done, 2 the input was wrong (one line on stderr says what), 1 our 
 
 import logging
 import sys
+import warnings
 
 import typer
 
@@ -60,7 +61,10 @@ def _version(
 
 def run() -> None:
     """Run the command line and exit the process with the code that says how it went."""
+    logging.addLevelName(logging.WARNING, "warning")
+    logging.addLevelName(logging.ERROR, "error")
     logging.basicConfig(format="%(levelname)s: %(message)s", level=logging.WARNING)
+    warnings.showwarning = _show_warning
     try:
         code = app(standalone_mode=False)
     except typer.Abort:
@@ -76,6 +80,11 @@ def run() -> None:
     except Exception as error:
         code = _handle_other(error)
     sys.exit(code or 0)
+
+
+def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
+    """Say a warning in one line, without the place in our code it comes from."""
+    print(f"warning: {message}", file=sys.stderr)
 
 
 def _handle_other(error: Exception) -> int:

@@ -3,9 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
-from numpy.typing import NDArray
 
 from retraverse.cli.options import (
     Every,
@@ -14,10 +12,9 @@ from retraverse.cli.options import (
     SkipBad,
     TechniqueName,
     make_technique,
+    positions_of,
 )
 from retraverse.cli.output import print_json, print_table, progress, remark
-from retraverse.datasets import load_positions
-from retraverse.errors import InputError
 from retraverse.images import Traverse, open_traverse
 from retraverse.maps import RouteMap, build_map, load_map
 
@@ -55,7 +52,7 @@ def build(
         make_technique(technique, settings),
         path=out,
         thumbnails=thumbnails,
-        positions=_positions_of(traverse, positions),
+        positions=None if positions is None else positions_of(traverse, positions),
         overwrite=overwrite,
         progress=progress(),
     )
@@ -80,7 +77,11 @@ def extend(
     """Add the frames of a further drive to the end of a map."""
     route = load_map(path, progress=progress())
     traverse = _open(source, every, skip_bad)
-    route.extend(traverse, positions=_positions_of(traverse, positions), progress=progress())
+    route.extend(
+        traverse,
+        positions=None if positions is None else positions_of(traverse, positions),
+        progress=progress(),
+    )
     _print_info(route, json_output)
 
 
@@ -89,19 +90,6 @@ def _open(source: str, every: int, skip_bad: bool) -> Traverse:
     for frame in traverse.skipped:
         remark(f"left out {frame.name}: {frame.reason}")
     return traverse
-
-
-def _positions_of(traverse: Traverse, table: Path | None) -> NDArray[np.float64] | None:
-    """Return the positions of the frames that were read, from a table of the whole drive."""
-    if table is None:
-        return None
-    positions = load_positions(table)
-    if len(positions) <= traverse.indices.max():
-        raise InputError(
-            f"--positions: {table} has {len(positions)} rows, expected one per picture "
-            f"({traverse.indices.max() + 1} or more)"
-        )
-    return positions[traverse.indices]
 
 
 def _print_info(route: RouteMap, json_output: bool) -> None:

@@ -28,6 +28,7 @@ __all__ = [
     "TruthPath",
     "make_matcher",
     "make_technique",
+    "positions_of",
     "read_sequence_length",
     "read_truth",
 ]
@@ -143,6 +144,17 @@ def _aligned(query: Traverse, reference: Traverse, tolerance: int, every: int) -
     return whole.select(kept_queries, kept_references)
 
 
+def positions_of(traverse: Traverse, table: Path) -> NDArray[np.float64]:
+    """Return the positions of the frames that were read, from a table of the whole drive."""
+    positions = load_positions(table)
+    if len(positions) <= traverse.indices.max():
+        raise InputError(
+            f"positions {table}: got {len(positions)} rows, expected at least "
+            f"{traverse.indices.max() + 1}, one per picture of {traverse.name}"
+        )
+    return positions[traverse.indices]
+
+
 def _positions_beside(traverse: Traverse) -> NDArray[np.float64]:
     """Return the positions of a traverse's frames from the table in its folder."""
     path = traverse[0].path
@@ -152,10 +164,4 @@ def _positions_beside(traverse: Traverse) -> NDArray[np.float64]:
             f"--radius: no positions.csv beside the pictures of {traverse.name}; expected a table "
             "of metres, one row per picture"
         )
-    positions = load_positions(table)
-    if len(positions) <= traverse.indices.max():
-        raise InputError(
-            f"--radius: {table} has {len(positions)} rows, expected at least "
-            f"{traverse.indices.max() + 1}, one per picture"
-        )
-    return positions[traverse.indices]
+    return positions_of(traverse, table)

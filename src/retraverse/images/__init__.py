@@ -7,6 +7,7 @@ Names
 - `SkippedFrame`: a frame left out on request, and why.
 - `GreyPath`, `ColourOrder`: the two ways to grey; the channel order of a user's arrays.
 - `decode_grey`, `decode_bgr`: the same decoding for bytes that came from elsewhere.
+- `without_stops`, `measure_motion`: a drive without the frames on which nothing moved.
 - `natural_key`, `PICTURE_SUFFIXES`: how folders are listed.
 
 Importing this package loads neither OpenCV nor Pillow.
@@ -17,9 +18,11 @@ from retraverse.images.files import PICTURE_SUFFIXES
 from retraverse.images.frame import Frame
 from retraverse.images.ordering import natural_key
 from retraverse.images.sources import Source, open_traverse
+from retraverse.images.stops import MIN_MOTION, measure_motion, without_stops
 from retraverse.images.traverse import SkippedFrame, Traverse
 
 __all__ = [
+    "MIN_MOTION",
     "PICTURE_SUFFIXES",
     "ColourOrder",
     "Frame",
@@ -29,6 +32,8 @@ __all__ = [
     "Traverse",
     "decode_bgr",
     "decode_grey",
+    "measure_motion",
     "natural_key",
     "open_traverse",
+    "without_stops",
 ]

@@ -6,8 +6,9 @@ from dataclasses import dataclass, field, replace
 from typing import SupportsIndex, overload
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from retraverse.errors import FrameReadError, ShapeError
+from retraverse.errors import FrameReadError, InputError, ShapeError
 from retraverse.images.frame import Frame
 from retraverse.types import IntArray, Progress, no_progress
 
@@ -69,6 +70,35 @@ class Traverse(Sequence[Frame]):
         source = f"{self.source}, 1 frame of every {every}"
         return replace(self, source=source, frames=self.frames[::every])
 
+    def take(self, frames: ArrayLike) -> "Traverse":
+        """Return the frames of these numbers, in this order; a number may come more than once.
+
+        Parameters
+        ----------
+        frames : int array, shape (N,)
+            Positions in this traverse, from 0. The frames keep their `index`.
+
+        Raises
+        ------
+        ShapeError
+            If these are not whole numbers of one axis.
+        InputError
+            If a number lies outside the traverse.
+        """
+        numbers = np.asarray(frames)
+        if numbers.ndim != 1 or (numbers.size and numbers.dtype.kind not in "iu"):
+            raise ShapeError(
+                f"frames: got {numbers.dtype} of shape {numbers.shape}, expected whole numbers "
+                "of one axis"
+            )
+        if numbers.size and not (numbers.min() >= 0 and numbers.max() < len(self)):
+            raise InputError(
+                f"frames: got numbers {numbers.min()} to {numbers.max()}, "
+                f"expected 0 to {len(self) - 1} ({self.name})"
+            )
+        source = f"{self.source}, {numbers.size} frames taken by number"
+        return replace(self, source=source, frames=tuple(self.frames[i] for i in numbers.tolist()))
+
     def content_hash(self, progress: Progress = no_progress) -> str:
         """Return the SHA-256 of all names and contents, in order, as 64 hexadecimal digits.
 
@@ -86,7 +116,7 @@ class Traverse(Sequence[Frame]):
             If a frame cannot be read.
         """
         digest = hashlib.sha256()
-        for frame in progress(self.frames, total=len(self), label=f"Hashing {self.name}"):
+        for frame in progress(self.frames, total=len(self), label=f"hashing {self.name}"):
             # Digests have one length, so no name can run into the contents after it.
             digest.update(hashlib.sha256(frame.name.encode()).digest())
             digest.update(hashlib.sha256(frame.fingerprint()).digest())
@@ -113,7 +143,7 @@ def skip_bad_frames(traverse: Traverse, progress: Progress = no_progress) -> Tra
         If no frame at all can be read.
     """
     good, bad = [], list(traverse.skipped)
-    for frame in progress(traverse.frames, total=len(traverse), label=f"Checking {traverse.name}"):
+    for frame in progress(traverse.frames, total=len(traverse), label=f"checking {traverse.name}"):
         reason = _why_unreadable(frame)
         if reason is None:
             good.append(frame)

@@ -187,7 +187,7 @@ def _scan(path: Path, progress: Progress) -> _Scan:
 
     capture = _capture(path)
     n_announced = max(int(capture.get(cv2.CAP_PROP_FRAME_COUNT)), 0)
-    label = f"Counting frames of {path.name}"
+    label = f"counting frames of {path.name}"
     with quiet_opencv():
         times = list(progress(_grabbed_times(capture), total=n_announced, label=label))
     if not times:

@@ -13,7 +13,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from retraverse.errors import InputError
+from retraverse.errors import InputError, MapError
 from retraverse.maps.contents import (
     Contents,
     check_columns,
@@ -90,6 +90,23 @@ class RouteMap:
         contents = self._contents
         record = TechniqueRecord.of(self._technique)
         return Provenance(record, contents.history, contents.content_sha256)
+
+    def with_technique(self, technique: Technique) -> "RouteMap":
+        """Return a map in memory of the same descriptions, compared by another technique.
+
+        For a technique that compares the same descriptions otherwise, such as a masked one.
+
+        Raises
+        ------
+        MapError
+            If its descriptions look different.
+        """
+        if technique.layout != self._technique.layout:
+            raise MapError(
+                f"map of {self._technique.name}: got {technique.name}, whose descriptions look "
+                "different; expected a technique of the same layout"
+            )
+        return RouteMap(technique, replace(self._contents, manifest=None), None)
 
     def blocks(self, max_bytes: int = BLOCK_BYTES) -> Iterator[tuple[int, Descriptions]]:
         """Yield consecutive frames' descriptions, with the row each block starts at.

@@ -76,6 +76,11 @@ def read_manifest(path: Path) -> Manifest:
             raise DataMissingError(f"{path}: no such map; build it first, or correct its name")
         if not path.is_dir():
             raise MapError(f"{path}: a map is a folder, got a file; is this a picture or a video?")
+        if not (path / MANIFEST).exists():
+            raise MapError(
+                f"{path}: not a route map: it has no {MANIFEST}; expected a folder made by "
+                "`map build` (is this a folder of pictures?)"
+            )
         content = read_regular(path, MANIFEST, OPENING)
     return Manifest.parse(content, f"{path / MANIFEST}")
 

@@ -13,6 +13,7 @@ import numpy as np
 from retraverse.errors import ConfigError
 from retraverse.images import Traverse
 from retraverse.maps import RouteMap
+from retraverse.matching.calibrated_length import Overlap, calibrated_windows, ensure_entropy
 from retraverse.matching.checks import (
     check_lengths_fit,
     check_sequence_length,
@@ -58,7 +59,8 @@ def match(
         The map; its technique describes the query.
     sequence_length : int or "dynamic"
         1 matches single frames; K windows of K frames; ``"dynamic"`` lets every window find its
-        own length (sections 3.2.5 and 3.2.6), for techniques that offer it and the mean.
+        own length (sections 3.2.5 and 3.2.6), for the mean: by the published thresholds with
+        convsequential, by thresholds calibrated on the map with any other technique.
     matcher : str or Matcher
         How the pairs become answers: a name of `matchers`, or a `matcher` with its parameters.
         ``"mean"`` is the thesis' own (equation 4.6).
@@ -70,7 +72,7 @@ def match(
     InputError
         If a traverse is shorter than a window.
     ConfigError
-        If the length is not offered by the technique, or the matcher is unknown.
+        If the length is not offered by the matcher, or the matcher is unknown.
 
     Notes
     -----
@@ -84,6 +86,8 @@ def match(
     """
     chosen = _chosen(matcher)
     queries = describe_query(query, route, progress=progress)
+    if sequence_length == "dynamic":
+        queries = ensure_entropy(queries, query, progress=progress)
     if chosen.name == "mean":
         matches = _match_mean(queries, route, sequence_length, progress)
     else:
@@ -198,10 +202,7 @@ def _static_lengths(n_queries: int, n_references: int, sequence_length: int) -> 
 def _dynamic_windows(queries: Descriptions, route: RouteMap) -> list[Window]:
     technique, parameters = route.technique, route.technique.parameters
     if not isinstance(parameters, ConvSequentialParameters):
-        raise ConfigError(
-            f"sequence_length 'dynamic': {technique.name} does not offer it; expected a whole "
-            "number, or the technique convsequential"
-        )
+        return calibrated_windows(queries, route)
     assert isinstance(technique, RegionalTechnique)
     rule = GrowthRule(
         sequence_entropy=parameters.sequence_entropy,
@@ -212,35 +213,6 @@ def _dynamic_windows(queries: Descriptions, route: RouteMap) -> list[Window]:
     )
     overlap = Overlap(technique, queries)
     return dynamic_windows(queries.arrays["entropy"], overlap, rule)
-
-
-class Overlap:
-    """Similarity of a frame with the ones after it, under its own region of interest.
-
-    Computed `AHEAD` frames at a time, since windows ask for one frame after the other.
-    """
-
-    AHEAD = 6
-
-    def __init__(self, technique: RegionalTechnique, queries: Descriptions) -> None:
-        self._technique = technique
-        self._queries = queries
-        self._weights = technique.region_weights(queries)
-        self._first = -1
-        self._scores: list[float] = []
-
-    def __call__(self, first: int, later: int) -> float:
-        if first != self._first:
-            self._first, self._scores = first, []
-        while later - first > len(self._scores):
-            start = first + 1 + len(self._scores)
-            scores = self._technique.weighted_similarity(
-                self._queries.descriptor[first],
-                self._queries.descriptor[start : start + self.AHEAD],
-                self._weights[first : first + 1],
-            )
-            self._scores.extend(scores[0].tolist())
-        return self._scores[later - first - 1]
 
 
 def _takes_first_roi(route: RouteMap) -> bool:

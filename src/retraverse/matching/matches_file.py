@@ -8,6 +8,7 @@ missing.
 """
 
 import csv
+import io
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from retraverse.errors import DataMissingError, InputError
-from retraverse.files import replace_file
+from retraverse.files import write_whole
 from retraverse.matching.matches import NO_MATCH, Matches
 
 __all__ = ["load_matches", "save_matches"]
@@ -42,14 +43,15 @@ def save_matches(
     """Write matches as CSV; the file is whole or not there."""
     answered = {int(query): window for window, query in enumerate(matches.query)}
     frame_reference = matches.frame_reference.tolist()
-    with replace_file(Path(path)) as file:
-        writer = csv.writer(file)
-        writer.writerow(COLUMNS)
-        for query, name in enumerate(query_names):
-            cells = [""] * 4
-            if query in answered:
-                cells = _answer_cells(matches, answered[query], reference_names)
-            writer.writerow([query, name, *cells, matches.n_references, frame_reference[query]])
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(COLUMNS)
+    for query, name in enumerate(query_names):
+        cells = [""] * 4
+        if query in answered:
+            cells = _answer_cells(matches, answered[query], reference_names)
+        writer.writerow([query, name, *cells, matches.n_references, frame_reference[query]])
+    write_whole(Path(path), text.getvalue().encode())
 
 
 def load_matches(path: Path | str) -> Matches:

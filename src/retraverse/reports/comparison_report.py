@@ -7,12 +7,12 @@ policy forbids it to ask the network for anything. It draws from the record only
 import base64
 import hashlib
 import os
-import secrets
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from retraverse.errors import InputError, ShapeError
+from retraverse.files import write_whole
 from retraverse.reports import wording
 from retraverse.reports.curve_figures import (
     accuracy_by_length,
@@ -76,7 +76,7 @@ def write_comparison_report(
         raise InputError(f"report {str(target)!r}: got a folder, expected the name of an HTML file")
     html = comparison_html(record, reference=reference, query=query, progress=progress)
     target.parent.mkdir(parents=True, exist_ok=True)
-    _write_whole(target, html.encode())
+    write_whole(target, html.encode())
     return target
 
 
@@ -151,17 +151,3 @@ def _rendered(context: dict[str, Any]) -> str:
 
 def _resource(name: str) -> str:
     return (resources.files("retraverse.reports") / "templates" / name).read_text("utf-8")
-
-
-def _write_whole(target: Path, content: bytes) -> None:
-    """Write beside the target, then rename: a reader sees the old page or the new one."""
-    temporary = target.with_name(f".{secrets.token_hex(8)}.tmp")
-    try:
-        with temporary.open("xb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(target)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise

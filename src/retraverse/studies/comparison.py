@@ -20,6 +20,7 @@ from retraverse.matching import (
     Matches,
     SequenceLength,
     describe_query,
+    ensure_entropy,
     match,
     match_similarity,
     similarity,
@@ -102,6 +103,8 @@ def compare(
     watch = _Stopwatch()
     route = build_map(reference, plan.technique, progress=progress)
     queries = describe_query(query, route, progress=progress)
+    if plan.sequence_length == "dynamic":
+        queries = ensure_entropy(queries, query, progress=progress)
     watch.lap("describe")
     matches = match(
         queries,
@@ -115,8 +118,8 @@ def compare(
     scores = similarity(queries, route, progress=progress)
     watch.lap("similarity")
     return ComparisonRecord(
-        reference=_traverse_record(reference),
-        query=_traverse_record(query),
+        reference=_traverse_record(reference, progress),
+        query=_traverse_record(query, progress),
         similarity=scores,
         matches=matches,
         evaluation=None if truth is None else evaluate(matches, truth, similarity=scores),
@@ -175,13 +178,13 @@ def _length_points(scores: FloatArray, truth: GroundTruth | None) -> tuple[Lengt
     return tuple(points)
 
 
-def _traverse_record(traverse: Traverse) -> TraverseRecord:
+def _traverse_record(traverse: Traverse, progress: Progress) -> TraverseRecord:
     return TraverseRecord(
         name=traverse.name,
         source=traverse.source,
         n_frames=len(traverse),
         skipped=tuple((frame.name, frame.reason) for frame in traverse.skipped),
-        content_hash=traverse.content_hash(),
+        content_hash=traverse.content_hash(progress),
         sizes=tuple(sorted({traverse[row].size[::-1] for row in _sample(len(traverse))})),
         frame_names=tuple(frame.name for frame in traverse),
     )

@@ -39,7 +39,7 @@ __all__ = [
 
 
 class _CallableRoom(ModuleType):
-    """The room itself, callable: ``retraverse.techniques`` is both the room and the verb that lists it.
+    """The room itself, callable: ``retraverse.techniques`` is a room and the verb that lists it.
 
     Importing the room puts the module where the package's top promises the function.
     """

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from retraverse.errors import FrameReadError
+from retraverse.errors import FrameReadError, InputError, ShapeError
 from retraverse.images import Frame, SkippedFrame, Traverse, open_traverse
 
 MakeFolder = Callable[..., Path]
@@ -91,7 +91,7 @@ def test_content_hash_tells_contents_names_and_order_apart(make_folder: MakeFold
 def test_content_hash_shows_progress(traverse: Traverse) -> None:
     watcher = Watcher()
     assert traverse.content_hash(watcher) == traverse.content_hash()
-    assert watcher.seen == [("Hashing drive", 12, 12)]
+    assert watcher.seen == [("hashing drive", 12, 12)]
 
 
 def test_bad_frames_are_skipped_counted_and_told(make_folder: MakeFolder) -> None:
@@ -105,7 +105,7 @@ def test_bad_frames_are_skipped_counted_and_told(make_folder: MakeFolder) -> Non
     assert (traverse.skipped[1].name, traverse.skipped[1].index) == ("3.png", 3)
     assert "truncated" in traverse.skipped[1].reason
     assert traverse.source == f"folder {folder} (5 pictures), 2 skipped"
-    assert watcher.seen == [("Checking drive", 5, 5)]
+    assert watcher.seen == [("checking drive", 5, 5)]
     assert traverse[:1].skipped == traverse.skipped
 
 
@@ -152,3 +152,25 @@ def test_skipping_again_keeps_what_was_skipped_before(make_folder: MakeFolder) -
 def test_frames_outlive_their_traverse(make_folder: MakeFolder) -> None:
     frames: list[Frame] = list(open_traverse(make_folder("0.png", "1.png")))
     assert frames[1].grey().max() == 1
+
+
+def test_taken_frames_come_in_the_order_asked_for(traverse: Traverse) -> None:
+    taken = traverse[2:].take([5, 0, 0, 3])
+    np.testing.assert_array_equal(taken.indices, [7, 2, 2, 5])
+    assert [frame.name for frame in taken] == ["7.png", "2.png", "2.png", "5.png"]
+    assert taken.name == traverse.name
+    assert taken.source == f"{traverse[2:].source}, 4 frames taken by number"
+    assert len(traverse.take([])) == 0
+    assert traverse.take(np.arange(12)).frames == traverse.frames
+
+
+@pytest.mark.parametrize("frames", [[12], [-1], [0, 99]])
+def test_frames_outside_the_traverse_cannot_be_taken(traverse: Traverse, frames: list[int]) -> None:
+    with pytest.raises(InputError, match="expected 0 to 11"):
+        traverse.take(frames)
+
+
+@pytest.mark.parametrize("frames", [[0.5], [[1, 2]], 3, [True, False]])
+def test_only_frame_numbers_can_be_taken(traverse: Traverse, frames: Any) -> None:
+    with pytest.raises(ShapeError, match="whole numbers of one axis"):
+        traverse.take(frames)

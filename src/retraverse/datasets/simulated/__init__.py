@@ -12,7 +12,6 @@ from retraverse.datasets.simulated.drive import (
     SimulatedDrive,
     SimulatedRoute,
     simulate_route,
-    write_drive,
 )
 from retraverse.datasets.simulated.motion import (
     Leg,
@@ -22,6 +21,7 @@ from retraverse.datasets.simulated.motion import (
     plan_motion,
 )
 from retraverse.datasets.simulated.street import Street, make_street
+from retraverse.datasets.simulated.write import write_drive
 
 __all__ = [
     "Camera",

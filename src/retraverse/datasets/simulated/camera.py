@@ -49,12 +49,12 @@ class Camera:
     """Pictures are painted this many times larger and averaged down: smooth edges."""
 
     def __post_init__(self) -> None:
-        _check("width", self.width, 16, 4096)
-        _check("height", self.height, 16, 4096)
+        _check("width", self.width, 16, 4096, is_whole=True)
+        _check("height", self.height, 16, 4096, is_whole=True)
         _check("field_of_view_deg", self.field_of_view_deg, 20, 140)
         _check("height_m", self.height_m, 0.3, 5.0)
         _check("horizon", self.horizon, 0.2, 0.8)
-        _check("supersampling", self.supersampling, 1, 4)
+        _check("supersampling", self.supersampling, 1, 4, is_whole=True)
 
     @cached_property
     def focal(self) -> float:
@@ -68,9 +68,12 @@ class Camera:
         return self.height * self.supersampling, self.width * self.supersampling
 
 
-def _check(name: str, value: float, low: float, high: float) -> None:
-    if not low <= value <= high:
-        raise ConfigError(f"camera {name} is {value!r}; expected {low} to {high}")
+def _check(name: str, value: object, low: float, high: float, *, is_whole: bool = False) -> None:
+    kinds = (int, np.integer) if is_whole else (int, float, np.number)
+    is_number = isinstance(value, kinds) and not isinstance(value, bool)
+    if not (is_number and low <= value <= high):  # type: ignore[operator]
+        kind = "an integer from" if is_whole else "a number from"
+        raise ConfigError(f"camera {name} is {value!r}; expected {kind} {low} to {high}")
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,7 @@ class Texture:
     @property
     def has_alpha(self) -> bool:
         """Whether parts of it are see-through."""
-        return self.pixels.shape[2] == 4
+        return bool(self.pixels.shape[2] == 4)
 
     def level(self, across: int, down: int) -> ImageArray:
         """Return the pixels, halved `across` times in width and `down` times in height."""
@@ -72,6 +72,8 @@ class Canvas:
         self.view, self.look = view, look
         self.pixels: ImageArray = np.empty((height, width, 3), np.uint8)
         self._haze = haze
+        self.bare_ground: ImageArray | None = None
+        """The picture before anything stood on the ground; kept where the road is wet."""
         self.glows: list[tuple[float, float, float, FloatArray]] = []
 
     def haze_at(self, depth: float) -> float:
@@ -117,8 +119,9 @@ class Canvas:
         box = self._box(corners)
         if box is None:
             return
-        pixels = self._sized(texture, corners, outline)
-        patch = self._warp(pixels, plane, box)
+        ratios = _texels_per_pixel(texture, corners, outline)
+        across, down = (math.floor(math.log2(max(ratio, 1.0)) + 0.35) for ratio in ratios)
+        patch = self._warp(texture.level(across, down), plane, box, halved=max(ratios) < 0.8)
         self._blend(patch, corners, box, self.haze_at((near + far) / 2), light)
 
     def _box(self, corners: list[Point]) -> tuple[int, int, int, int] | None:
@@ -130,28 +133,29 @@ class Canvas:
         bottom = min(height, math.ceil(max(rows)) + 1)
         return (left, top, right, bottom) if right > left and bottom > top else None
 
-    def _sized(self, texture: Texture, corners: list[Point], outline: list[Point]) -> ImageArray:
-        """Return the texture at the size that fits how large it appears."""
-        levels = []
-        for axis, size in ((0, texture.pixels.shape[1]), (1, texture.pixels.shape[0])):
-            shown = _extent(corners, axis)
-            ratio = size * _extent(outline, axis) / max(shown, 0.5)
-            levels.append(math.floor(math.log2(max(ratio, 1.0)) + 0.35))
-        return texture.level(levels[0], levels[1])
-
     def _warp(
-        self, pixels: ImageArray, plane: "_Plane", box: tuple[int, int, int, int]
+        self, pixels: ImageArray, plane: "_Plane", box: tuple[int, int, int, int], *, halved: bool
     ) -> ImageArray:
-        """Return the texture in perspective, cut to the box."""
+        """Return the texture in perspective, cut to the box.
+
+        With `halved` it is worked out at half the size and enlarged: as good, and cheaper, where
+        the texture is coarser than the picture.
+        """
         import cv2
 
-        height, width = pixels.shape[:2]
-        matrix = plane.texel_of_pixel(self.view, (width, height), (box[0], box[1]))
+        width, height = box[2] - box[0], box[3] - box[1]
+        matrix = plane.texel_of_pixel(self.view, pixels.shape, (box[0], box[1]))
+        size = (width, height)
+        if halved:
+            size = ((width + 1) // 2, (height + 1) // 2)
+            matrix = matrix @ np.array([[2.0, 0.0, 0.5], [0.0, 2.0, 0.5], [0.0, 0.0, 1.0]])
         border = cv2.BORDER_CONSTANT if pixels.shape[2] == 4 else cv2.BORDER_REPLICATE
-        return np.asarray(cv2.warpPerspective(
-            pixels, matrix, (box[2] - box[0], box[3] - box[1]),
-            flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP, borderMode=border,
-        ))  # fmt: skip
+        patch = cv2.warpPerspective(pixels, matrix, size, borderMode=border,
+                                    flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)  # fmt: skip
+        if halved:
+            whole = (2 * size[0], 2 * size[1])
+            patch = cv2.resize(patch, whole, interpolation=cv2.INTER_LINEAR)[:height, :width]
+        return np.asarray(patch)
 
     def _blend(
         self, patch: ImageArray, corners: list[Point], box: tuple[int, int, int, int], haze: float,
@@ -164,11 +168,13 @@ class Canvas:
         target = self.pixels[top:bottom, left:right]
         hazes = self._haze[: bottom - top, : right - left]
         has_alpha = patch.shape[2] == 4
-        alpha = cv2.cvtColor(cv2.extractChannel(patch, 3), cv2.COLOR_GRAY2RGB) if has_alpha else None
+        alpha = None
+        if has_alpha:
+            alpha = cv2.cvtColor(cv2.extractChannel(patch, 3), cv2.COLOR_GRAY2RGB)
         colours = cv2.cvtColor(patch, cv2.COLOR_RGBA2RGB) if has_alpha else patch
         if light is not None:
-            colours = cv2.multiply(colours, (*light.tolist(), 0.0))
-        if haze > 0.015:
+            colours = cv2.multiply(colours, np.array([*light.tolist(), 0.0]))
+        if haze > 0.03:
             cover = hazes if alpha is None else cv2.multiply(hazes, alpha, scale=1 / 255)
             colours = cv2.addWeighted(colours, 1.0 - haze, cover, haze, 0.0)
         if alpha is None:
@@ -284,14 +290,13 @@ class _Plane:
                            row + scale * (y + u * ay + v * dy)))  # fmt: skip
         return pixels
 
-    def texel_of_pixel(
-        self, view: View, size: tuple[int, int], origin: tuple[int, int]
-    ) -> Points:
+    def texel_of_pixel(self, view: View, shape: tuple[int, ...], origin: tuple[int, int]) -> Points:
         """Return the 3 x 3 matrix from pixels, counted from `origin`, to texture pixels."""
         focal, (column, row) = view.camera.focal, view.centre
         column, row = column - origin[0] - 0.5, row - origin[1] - 0.5
-        width, height = size
-        a, d = ([value / n for value in edge] for edge, n in ((self.across, width), (self.down, height)))
+        height, width = shape[:2]
+        a = [value / width for value in self.across]
+        d = [value / height for value in self.down]
         c = [self.corner[i] + 0.5 * (a[i] + d[i]) for i in range(3)]
         forward = [[focal * edge[k] + (column, row)[k] * edge[2] for edge in (a, d, c)]
                    for k in (0, 1)]  # fmt: skip
@@ -304,6 +309,16 @@ def _inverse(m: list[list[float]]) -> Points:
     return np.array([[e * i - f * h, c * h - b * i, b * f - c * e],
                      [f * g - d * i, a * i - c * g, c * d - a * f],
                      [d * h - e * g, b * g - a * h, a * e - b * d]])  # fmt: skip
+
+
+def _texels_per_pixel(
+    texture: Texture, corners: list[Point], outline: list[Point]
+) -> tuple[float, float]:
+    """Return how many texture pixels fall on one of the picture, across and down."""
+    height, width = texture.pixels.shape[:2]
+    across = width * _extent(outline, 0) / max(_extent(corners, 0), 0.5)
+    down = height * _extent(outline, 1) / max(_extent(corners, 1), 0.5)
+    return across, down
 
 
 def _extent(points: list[Point], axis: int) -> float:

@@ -42,7 +42,7 @@ class Disturbances:
     rain: float = 0.0
     """Overcast sky, wet dark road, streaks; no direct sun, so no shadows."""
     vibration: float = 0.0
-    """Heading jitter (1.5 degrees), pitch jitter and slow weaving in the lane (0.3 m)."""
+    """Heading (standard deviation 0.75 degrees) and pitch jitter, weaving in the lane (0.3 m)."""
     speed_change: float = 0.0
     """Smoothly varying speed; at 1 between half and twice the nominal speed."""
     stops: float = 0.0
@@ -133,8 +133,8 @@ def make_look(disturbances: Disturbances) -> Look:
 
 def _sky_colours(night: float, overcast: float) -> tuple[FloatArray, FloatArray]:
     """Return the colours of the sky overhead and at the horizon."""
-    zenith = blend(_rgb(112, 160, 214), _rgb(184, 190, 198), overcast)
-    horizon = blend(_rgb(214, 226, 236), _rgb(218, 221, 225), overcast)
+    zenith = blend(_rgb(108, 162, 222), _rgb(190, 196, 204), overcast)
+    horizon = blend(_rgb(218, 230, 240), _rgb(218, 221, 225), overcast)
     dusk_low = blend(_rgb(206, 138, 100), _rgb(112, 110, 118), overcast)
     return (
         _through_night(zenith, _rgb(62, 74, 112), _rgb(9, 11, 21), night),

@@ -9,9 +9,9 @@ Conventions
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from pathlib import Path
+from functools import cached_property, lru_cache
 from typing import overload
+from weakref import WeakValueDictionary
 
 import numpy as np
 
@@ -22,10 +22,10 @@ from retraverse.datasets.simulated.path import Metres
 from retraverse.datasets.simulated.render import Painter
 from retraverse.datasets.simulated.street import LANE_M, Street, make_street
 from retraverse.datasets.simulated.traffic import Traffic
-from retraverse.errors import ConfigError, InputError
-from retraverse.types import BoolArray, ImageArray, IntArray, Progress, no_progress
+from retraverse.errors import ConfigError
+from retraverse.types import BoolArray, ImageArray, IntArray
 
-__all__ = ["SimulatedDrive", "SimulatedRoute", "simulate_route", "write_drive"]
+__all__ = ["SimulatedDrive", "SimulatedRoute", "simulate_route"]
 
 FRAME_S = 0.25
 """Seconds between frames, for traffic: 2 m spacing is 29 km/h."""
@@ -66,6 +66,11 @@ class SimulatedDrive(Sequence[ImageArray]):
         return len(self._frames)
 
     @property
+    def name(self) -> str:
+        """What reports and messages call the drive."""
+        return f"simulated street, seed {self.street.seed}, drive {self.seed}"
+
+    @property
     def positions_m(self) -> Metres:
         """Position along the route, float64 (N,); NaN off the route."""
         return self.motion.positions_m[self._frames]
@@ -92,6 +97,21 @@ class SimulatedDrive(Sequence[ImageArray]):
             yield self._shared.render(int(frame))
 
 
+_street = lru_cache(maxsize=8, typed=True)(make_street)
+_painters: WeakValueDictionary[tuple[Street, Disturbances, Camera], Painter] = WeakValueDictionary()
+
+
+def _painter(street: Street, disturbances: Disturbances, camera: Camera) -> Painter:
+    """Return a painter, the same one for drives that look alike: its textures take seconds."""
+    d = disturbances
+    seen = Disturbances(season=d.season, night=d.night, fog=d.fog, rain=d.rain)
+    key = (street, seen, camera)
+    painter = _painters.get(key)
+    if painter is None:
+        _painters[key] = painter = Painter(street, make_look(seen), camera)
+    return painter
+
+
 @dataclass(frozen=True)
 class _Rendering:
     """What all slices of a drive share."""
@@ -104,14 +124,14 @@ class _Rendering:
 
     @cached_property
     def painter(self) -> Painter:
-        return Painter(self.street, make_look(self.disturbances), self.camera)
+        return _painter(self.street, self.disturbances, self.camera)
 
     @cached_property
     def detour_painter(self) -> Painter:
         """Paints the other street, where the drive is off the route."""
         length = max(20.0, float(self.motion.places_m[~self.motion.on_route].max()))
-        street = make_street(self.street.seed + DETOUR_SEED, length)
-        return Painter(street, make_look(self.disturbances), self.camera)
+        street = _street(self.street.seed + DETOUR_SEED, length)
+        return _painter(street, self.disturbances, self.camera)
 
     @cached_property
     def traffic(self) -> Traffic:
@@ -159,7 +179,7 @@ class SimulatedRoute:
         ConfigError
             `radius_m` is negative or not a number.
         """
-        if not radius_m >= 0:
+        if not (math.isfinite(radius_m) and radius_m >= 0):
             raise ConfigError(f"radius_m is {radius_m!r}; expected metres from 0")
         references = self.reference.positions_m
         return tuple(
@@ -207,73 +227,20 @@ def simulate_route(
     >>> route.query[3].shape, route.truth(radius_m=2.0)[3].tolist()
     ((240, 320, 3), [2, 3, 4])
     """
-    if not 2 <= n_frames <= 50000:
-        raise ConfigError(f"n_frames is {n_frames!r}; expected 2 to 50000")
+    if not (isinstance(n_frames, int | np.integer) and 2 <= n_frames <= 50000):
+        raise ConfigError(f"n_frames is {n_frames!r}; expected an integer from 2 to 50000")
     if not (math.isfinite(spacing_m) and 0 < spacing_m <= 50):
         raise ConfigError(f"spacing_m is {spacing_m!r}; expected metres above 0, up to 50")
     length = n_frames * spacing_m
-    street = make_street(seed, max(length, 10.0))
+    street = _street(seed, max(length, 10.0))
     drives = []
     for number, (changes, kind) in enumerate(((reference, "forward"), (query, motion))):
         d = changes or Disturbances()
         drive_seed = 2 * seed + number
         profile = plan_motion(
-            kind, length_m=length, spacing_m=spacing_m,  # type: ignore[arg-type]
+            kind, length_m=length, spacing_m=spacing_m,
             speed_change=d.speed_change, stops=d.stops, revisits=d.revisits, seed=drive_seed,
         )  # fmt: skip
         frames = profile.frames(drive_seed)
         drives.append(SimulatedDrive(street, frames, d, camera=camera, seed=drive_seed))
     return SimulatedRoute(reference=drives[0], query=drives[1])
-
-
-def write_drive(
-    drive: SimulatedDrive, folder: str | Path, *, quality: int = 95,
-    progress: Progress = no_progress,
-) -> Path:  # fmt: skip
-    """Write a drive as JPEG files and a table of positions.
-
-    Writes ``0000.jpg``, ``0001.jpg``, ... (more digits where needed) and ``positions.csv`` with
-    the columns ``frame,name,position_m,on_route``; the position is empty off the route.
-
-    Parameters
-    ----------
-    drive : SimulatedDrive
-    folder : str or Path
-        Made if absent; must be empty.
-    quality : int in [1, 100]
-        JPEG quality, as Pillow counts it.
-    progress : Progress, optional
-
-    Returns
-    -------
-    folder : Path
-
-    Raises
-    ------
-    ConfigError
-        `quality` is out of range.
-    InputError
-        The folder holds something already, or is a file.
-    """
-    from PIL import Image
-
-    if not 1 <= quality <= 100:
-        raise ConfigError(f"JPEG quality is {quality!r}; expected 1 to 100")
-    folder = Path(folder)
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise InputError(f"{folder} is not an empty folder; expected one to write frames to")
-    folder.mkdir(parents=True, exist_ok=True)
-    digits = max(4, len(str(len(drive) - 1)))
-    rows = ["frame,name,position_m,on_route"]
-    places = zip(drive.positions_m, drive.on_route, strict=True)
-    for i, (position, on_route) in enumerate(places):
-        rows.append(_row(i, f"{i:0{digits}d}.jpg", float(position), bool(on_route)))
-    for i, picture in enumerate(progress(drive, total=len(drive), label="rendering frames")):
-        Image.fromarray(picture).save(folder / f"{i:0{digits}d}.jpg", quality=quality)
-    (folder / "positions.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
-    return folder
-
-
-def _row(frame: int, name: str, position: float, on_route: bool) -> str:
-    shown = f"{position:.3f}" if on_route else ""
-    return f"{frame},{name},{shown},{str(on_route).lower()}"

@@ -10,7 +10,7 @@ from retraverse.types import FloatArray, ImageArray
 
 __all__ = ["finish"]
 
-NOISE = 13.0
+NOISE = 10.0
 """Standard deviation of the sensor's noise at full night, grey levels."""
 
 
@@ -19,15 +19,15 @@ def finish(canvas: Canvas, rng: np.random.Generator) -> ImageArray:
     import cv2
 
     look, camera = canvas.look, canvas.view.camera
-    for column, row, radius, colour in canvas.glows:
-        _add_glow(canvas.pixels, column, row, radius, colour)
     if look.wet > 0:
         _mirror_in_road(canvas)
+    for column, row, radius, colour in canvas.glows:
+        _add_glow(canvas.pixels, column, row, radius, colour)
     size = (camera.width, camera.height)
-    picture = np.asarray(cv2.resize(canvas.pixels, size, interpolation=cv2.INTER_AREA))
+    picture = np.asarray(cv2.resize(canvas.pixels, size, interpolation=cv2.INTER_AREA), np.uint8)
     if look.darkness > 0.1:
         picture = _bloom(picture, look.darkness)
-    picture = np.asarray(cv2.multiply(picture, _vignette(*size), dtype=cv2.CV_8U))
+    picture = np.asarray(cv2.multiply(picture, _vignette(*size), dtype=cv2.CV_8U), np.uint8)
     if look.rain > 0:
         picture = _streaks(picture, look.rain, rng)
     if look.darkness > 0:
@@ -39,7 +39,7 @@ def finish(canvas: Canvas, rng: np.random.Generator) -> ImageArray:
 def _glow_sprite() -> FloatArray:
     axis = np.linspace(-2.6, 2.6, 65, dtype=np.float32)
     square = axis[None] ** 2 + axis[:, None] ** 2
-    return np.clip(np.exp(-square) - 0.0012, 0, 1).astype(np.float32)
+    return np.asarray(np.clip(np.exp(-square) - 0.0012, 0, 1), np.float32)
 
 
 def _add_glow(
@@ -74,7 +74,11 @@ def _mirror_in_road(canvas: Canvas) -> None:
     mirrored = np.ascontiguousarray(canvas.pixels[horizon - rows : horizon][::-1])
     smeared = cv2.blur(mirrored, (5, 41))
     weight = 0.34 * canvas.look.wet
-    below[:rows] = cv2.addWeighted(below[:rows], 1 - 0.6 * weight, smeared, weight, 0)
+    wet = cv2.addWeighted(below[:rows], 1 - 0.6 * weight, smeared, weight, 0)
+    if canvas.bare_ground is not None:
+        bare = canvas.bare_ground[horizon : horizon + rows]
+        is_bare = (cv2.absdiff(below[:rows], bare).max(axis=2) == 0).astype(np.uint8)
+        cv2.copyTo(wet, is_bare, below[:rows])
 
 
 def _bloom(picture: ImageArray, darkness: float) -> ImageArray:
@@ -84,9 +88,10 @@ def _bloom(picture: ImageArray, darkness: float) -> ImageArray:
     height, width = picture.shape[:2]
     small = cv2.resize(picture, (max(1, width // 4), max(1, height // 4)),
                        interpolation=cv2.INTER_AREA)  # fmt: skip
-    bright = cv2.GaussianBlur(cv2.subtract(small, (120.0, 120.0, 120.0, 0.0)), (0, 0), 2.2)
+    threshold = np.array([120.0, 120.0, 120.0, 0.0])
+    bright = cv2.GaussianBlur(cv2.subtract(small, threshold), (0, 0), 2.2)
     large = cv2.resize(bright, (width, height), interpolation=cv2.INTER_LINEAR)
-    return np.asarray(cv2.addWeighted(picture, 1.0, large, 0.8 * darkness, 0))
+    return np.asarray(cv2.addWeighted(picture, 1.0, large, 0.8 * darkness, 0), np.uint8)
 
 
 @lru_cache(maxsize=4)
@@ -109,7 +114,7 @@ def _streaks(picture: ImageArray, rain: float, rng: np.random.Generator) -> Imag
         long = int(rng.integers(4, 14) * height / 240)
         tone = float(rng.uniform(150, 215)) * (0.35 + 0.65 * float(picture[y, x].mean()) / 255)
         cv2.line(layer, (x, y), (x - long // 5, y + long), (tone, tone, tone), 1, cv2.LINE_AA)
-    return np.asarray(cv2.addWeighted(picture, 0.55, layer, 0.45, 0))
+    return np.asarray(cv2.addWeighted(picture, 0.55, layer, 0.45, 0), np.uint8)
 
 
 def _add_noise(picture: ImageArray, deviation: float, rng: np.random.Generator) -> ImageArray:

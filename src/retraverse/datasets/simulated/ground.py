@@ -6,11 +6,13 @@ for every ground pixel.
 """
 
 import math
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
-from retraverse.datasets.simulated.camera import Points, View
+from retraverse.datasets.simulated.camera import View
 from retraverse.datasets.simulated.canvas import Canvas
 from retraverse.datasets.simulated.conditions import Look
 from retraverse.datasets.simulated.lighting import SUN_ELEVATION, lamp_light, sun_along
@@ -28,9 +30,12 @@ PER_S, PER_D = 4, 8
 HALF_M = 26.0
 PERIOD_M = 9.0
 """From one lane dash to the next."""
+PLOT_M = 65.0
+"""How far plots reach from the centre line."""
 CROSSING_D = [-KERB_M + 0.5 + 1.18 * stripe for stripe in range(9)]
 
 ROAD = np.array([118, 118, 120], np.float32)
+KERB = np.array([206, 202, 194], np.float32)
 SNOW = np.array([238, 240, 246], np.float32)
 COLOURS = {
     "grass": np.array([98, 118, 66], np.float32),
@@ -39,9 +44,10 @@ COLOURS = {
 }
 PAINT = np.array([214, 214, 208], np.float32)
 
-
 Patch = tuple[tuple[float, float, float, float], FloatArray]
 """Start and end along the street, left and right across it, and a colour."""
+Cells = Callable[[list[tuple[float, float]]], NDArray[np.int32]]
+"""From places (s, d) to cells of the baked map, in sixteenths."""
 
 
 class GroundPainter:
@@ -55,42 +61,40 @@ class GroundPainter:
     def paint(self, canvas: Canvas) -> None:
         """Fill everything below the horizon."""
         view = canvas.view
-        top = max(0, math.ceil(view.centre[1] + 0.2))
+        step = view.camera.supersampling
+        top = max(0, math.floor(view.centre[1] / step) * step)
         _fill(canvas.pixels[top:], COLOURS["grass"])
         self._bands(canvas)
         self._markings(canvas)
         self._finish(canvas, top)
 
-    def _line(self, view: View, s: Metres, d: float) -> Points:
-        return view.to_camera(self.street.line.points(s, d))
-
     def _bands(self, canvas: Canvas) -> None:
-        """Fill plots, pavements, kerbs and road."""
+        """Fill plots, pavements, kerbs, side streets and road, in this order."""
         view, position = canvas.view, canvas.view.position_m
-        s = position + np.concatenate([np.linspace(-6, 6, 13), np.geomspace(7, VIEW_M, 34)])
-        for ground in self.street.grounds_between(position - 4, position + VIEW_M):
-            if ground.front_m >= FRONT_M:
-                self._plot(canvas, ground, 60.0)
+        grounds = self.street.grounds_between(position, position + VIEW_M)
+        self._plots(canvas, [ground for ground in grounds if ground.front_m >= FRONT_M])
+        s = position + np.concatenate([np.linspace(-4, 6, 11), np.geomspace(7, VIEW_M, 24)])
+        across = np.array([KERB_M - 0.14, KERB_M, KERB_M + 0.16, FRONT_M])
+        d = np.concatenate([-across, across])
+        lines = view.to_camera(self.street.line.points(s[None], d[:, None]))
         dry = np.float32(1.0 - 0.3 * self.look.wet)
-        pavement, kerb = COLOURS["paving"] * dry, np.array([206, 202, 194], np.float32) * dry
-        for side in (-1, 1):
-            inner, outer = self._line(view, s, side * KERB_M), self._line(view, s, side * FRONT_M)
-            canvas.strip(inner, outer, pavement)
-            canvas.strip(inner, self._line(view, s, side * (KERB_M + 0.16)), kerb)
-        for ground in self.street.grounds_between(position - 4, position + VIEW_M):
-            if ground.front_m < FRONT_M:
-                self._plot(canvas, ground, 70.0)
-        edges = [self._line(view, s, side * KERB_M) for side in (-1, 1)]
-        canvas.strip(edges[0], edges[1], ROAD * np.float32(1.0 - 0.35 * self.look.wet))
-        for side, edge in zip((-1, 1), edges, strict=True):
-            canvas.strip(edge, self._line(view, s, side * (KERB_M - 0.14)), ROAD * np.float32(0.62))
+        for side in (0, 4):
+            canvas.strip(lines[side + 1], lines[side + 3], COLOURS["paving"] * dry)
+            canvas.strip(lines[side + 1], lines[side + 2], KERB * dry)
+        self._plots(canvas, [ground for ground in grounds if ground.front_m < FRONT_M])
+        canvas.strip(lines[1], lines[5], ROAD * np.float32(0.62))
+        canvas.strip(lines[0], lines[4], ROAD * np.float32(1.0 - 0.35 * self.look.wet))
 
-    def _plot(self, canvas: Canvas, ground: Ground, reach_m: float) -> None:
-        start = max(ground.start_m, canvas.view.position_m - 6)
-        end = min(ground.end_m, canvas.view.position_m + VIEW_M)
-        s = np.linspace(start, end, 5 if start < canvas.view.position_m + 20 else 2)
-        near, far = (self._line(canvas.view, s, ground.side * d) for d in (ground.front_m, reach_m))
-        canvas.polygon(np.concatenate([near, far[::-1]]), COLOURS[ground.kind], haze=0.0)
+    def _plots(self, canvas: Canvas, grounds: list[Ground]) -> None:
+        """Fill plots from their front outwards, from where they come into view."""
+        if not grounds:
+            return
+        position = canvas.view.position_m
+        ends = np.clip([(g.start_m, g.end_m) for g in grounds], position + 2.5, position + VIEW_M)
+        reach = np.array([g.side * np.array([g.front_m, PLOT_M]) for g in grounds])
+        s, d = ends[:, [0, 1, 1, 0]], reach[:, [0, 0, 1, 1]]
+        corners = canvas.view.to_camera(self.street.line.points(s, d))
+        canvas.patches(corners, np.array([COLOURS[ground.kind] for ground in grounds]))
 
     def _markings(self, canvas: Canvas) -> None:
         """Fill repairs, lane dashes, parking lines, and crossings at side streets."""
@@ -131,37 +135,37 @@ class GroundPainter:
     def _finish(self, canvas: Canvas, top: int) -> None:
         """Multiply in light and grain, lay snow, add headlights and haze.
 
-        All this is smooth, so it is worked out at the camera's own size and enlarged.
+        Worked out at the camera's own size: what is painted over it later needs the smooth
+        edges of the enlarged picture, the ground beneath does not.
         """
         import cv2
 
         below = canvas.pixels[top:]
         step = canvas.view.camera.supersampling
-        depth, s, d = self._places(canvas.view, top, len(below), step)
+        rows, columns = len(below) // step, below.shape[1] // step
+        small = cv2.resize(below, (columns, rows), interpolation=cv2.INTER_AREA)
+        depth, s, d = self._places(canvas.view, top, rows, step)
         baked = self._lookup(s, d, depth, canvas.view.position_m)
         gain = baked[:, :, :3] * _grain(s, d, depth)[:, :, None]
         if self.look.lamps > 0:
-            gain += self.look.lamps * _headlights(canvas.view, depth, s.shape[1], step)
-        added = np.zeros_like(gain)
+            gain += self.look.lamps * _headlights(canvas.view, depth, columns, step)
         if self.look.snow > 0:
             cover = baked[:, :, 3:]
-            added = gain * cover * SNOW
-            gain *= 1 - cover
-        clear = np.exp(-depth / self.look.sight_m)[:, None, None]
-        added = added * clear + self.look.haze * (1 - clear)
+            shone = (small + cover * (SNOW - small)) * gain
+        else:
+            shone = small * gain
+        shone += (1 - np.exp(-depth / self.look.sight_m))[:, None, None] * (self.look.haze - shone)
         size = (below.shape[1], below.shape[0])
-        gain, added = (cv2.resize(array, size, interpolation=cv2.INTER_LINEAR)
-                       for array in (gain * clear, added))  # fmt: skip
-        shone = cv2.multiply(below, gain, dtype=cv2.CV_8U)
-        below[:] = cv2.add(shone, added, dtype=cv2.CV_8U)
+        whole = cv2.convertScaleAbs(shone)
+        cv2.resize(whole, size, dst=below, interpolation=cv2.INTER_NEAREST)
 
     def _places(
-        self, view: View, top: int, rows: int, step: int
+        self, view: View, top: int, count: int, step: int
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return where ground pixels lie: depth by row, s and d by row and column, metres."""
         line, focal = self.street.line, view.camera.focal
-        count, width = max(1, round(rows / step)), view.camera.canvas[1] // step
-        row = top + (np.arange(count) + 0.5) * (rows / count) - view.centre[1]
+        width = view.camera.canvas[1] // step
+        row = top + (np.arange(count) + 0.5) * step - view.centre[1]
         depth = np.minimum(focal * view.camera.height_m / np.maximum(row, 0.4), 320.0)
         along = view.position_m + np.linspace(-4, 330, 168)
         centre = view.to_camera(line.points(along, 0.0))
@@ -227,7 +231,7 @@ class GroundPainter:
         along, right = sun_along(self.street, start + STRETCH_M / 2)
         reach = 1.0 / math.tan(SUN_ELEVATION)
 
-        def cells(points: list[tuple[float, float]]) -> np.ndarray:
+        def cells(points: list[tuple[float, float]]) -> NDArray[np.int32]:
             at = [((d + HALF_M) * PER_D * 16, (s - start) * PER_S * 16) for s, d in points]
             return np.round(np.array(at)).astype(np.int32)
 
@@ -238,14 +242,15 @@ class GroundPainter:
                 ds, dd = -high * reach * along, -high * reach * right
                 if dd * thing.side < 0:
                     corners = [(thing.start_m, front), (thing.end_m, front),
-                               (thing.end_m + ds, front + dd), (thing.start_m + ds, front + dd)]  # fmt: skip
+                               (thing.end_m + ds, front + dd),
+                               (thing.start_m + ds, front + dd)]  # fmt: skip
                     cv2.fillConvexPoly(mask, cells(corners), 225, shift=4)
             elif isinstance(thing, Tree):
                 self._tree_shadow(mask, thing, cells, (along * reach, right * reach))
-        return np.asarray(cv2.GaussianBlur(mask, (0, 0), 1.6), np.float32) / 255
+        return np.asarray(cv2.GaussianBlur(mask, (0, 0), 1.6), np.float32) / np.float32(255)
 
     def _tree_shadow(
-        self, mask: ImageArray, tree: Tree, cells: object, reach: tuple[float, float]
+        self, mask: ImageArray, tree: Tree, cells: Cells, reach: tuple[float, float]
     ) -> None:
         """Add the ragged shadow of a crown."""
         import cv2
@@ -254,11 +259,12 @@ class GroundPainter:
         tone = 70 + 130 * self.look.leaves
         middle = (tree.key_m - 0.6 * tree.height_m * reach[0],
                   tree.lateral_m - 0.6 * tree.height_m * reach[1])  # fmt: skip
-        assert callable(cells)
         for _ in range(14):
             s, d = np.array(middle) + rng.normal(0, 0.17 * tree.height_m, 2)
             at = cells([(float(s), float(d))])[0]
-            size = (round(0.11 * tree.height_m * PER_D * 16), round(0.11 * tree.height_m * PER_S * 16))
+            size = [
+                round(0.11 * tree.height_m * cells_a_metre * 16) for cells_a_metre in (PER_D, PER_S)
+            ]
             turn = np.linspace(0, 2 * np.pi, 10, endpoint=False)
             ring = at + np.stack([np.cos(turn) * size[0], np.sin(turn) * size[1]], axis=1)
             cv2.fillConvexPoly(mask, np.round(ring).astype(np.int32), tone, shift=4)
@@ -269,7 +275,7 @@ def _wear(d: Metres) -> FloatArray:
     lane = np.abs(np.abs(d) - LANE_M / 2)
     tone = 1.0 - 0.07 * np.exp(-((lane / 0.3) ** 2)) + 0.05 * np.exp(-(((lane - 0.75) / 0.25) ** 2))
     edge = 1.0 - 0.16 * np.exp(-(((np.abs(d) - KERB_M) / 0.5) ** 2))
-    return np.where(np.abs(d) < KERB_M, tone * edge, 1.0).astype(np.float32)
+    return np.asarray(np.where(np.abs(d) < KERB_M, tone * edge, 1.0), np.float32)
 
 
 def _snow_cover(s: Metres, d: Metres, snow: float) -> FloatArray:
@@ -283,7 +289,7 @@ def _snow_cover(s: Metres, d: Metres, snow: float) -> FloatArray:
     depth = depth - 0.5 * np.exp(-(((lane - 0.75) / 0.3) ** 2)) * (away < LANE_M)
     field = fractal_noise((512, 512), 71, cells=12, octaves=5)
     noise = field[(s * 9).astype(int) % 512, (d * 14).astype(int) % 512]
-    return np.clip((1.1 * depth * snow - noise) * 4, 0, 0.95).astype(np.float32)
+    return np.asarray(np.clip((1.1 * depth * snow - noise) * 4, 0, 0.95), np.float32)
 
 
 def _grain(s: FloatArray, d: FloatArray, depth: FloatArray) -> FloatArray:
@@ -300,7 +306,7 @@ def _grain(s: FloatArray, d: FloatArray, depth: FloatArray) -> FloatArray:
 def _grain_tile() -> FloatArray:
     fine = fractal_noise((512, 512), 70, cells=64, octaves=3)
     broad = fractal_noise((512, 512), 72, cells=3, octaves=4)
-    return 0.32 * (fine - fine.mean()) + 0.2 * (broad - broad.mean())
+    return np.asarray(0.34 * (fine - fine.mean()) + 0.09 * (broad - broad.mean()), np.float32)
 
 
 def _headlights(view: View, depth: FloatArray, width: int, step: int) -> FloatArray:

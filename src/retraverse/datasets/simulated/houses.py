@@ -20,6 +20,10 @@ UP = np.array([0.0, -1.0, 0.0])
 """Up in camera space."""
 
 
+CHIMNEY_M = 100.0
+"""Chimneys farther away are left out."""
+
+
 @dataclass(frozen=True)
 class _Corners:
     """A house's ground plan in camera space."""
@@ -69,9 +73,7 @@ class HousePainter:
             top = UP * (building.eaves_m + (building.roof_m if building.roof == "gable" else 0.0))
             canvas.panel(self._front(building), plan.start + top, plan.along, -top)
 
-    def _draw_roof(
-        self, canvas: Canvas, building: Building, plan: _Corners, eaves: Points
-    ) -> None:
+    def _draw_roof(self, canvas: Canvas, building: Building, plan: _Corners, eaves: Points) -> None:
         """Draw the slope towards the street, or for a gable the slope towards the camera."""
         rise = UP * building.roof_m
         if building.roof == "gable":
@@ -87,7 +89,7 @@ class HousePainter:
             slope_m = round(float(np.linalg.norm(down)), 2)
             overhang = down * 1.06
             canvas.panel(self._roof(building, slope_m), corner, across, overhang)
-        if building.roof == "ridge" and building.storeys <= 3:
+        if building.roof == "ridge" and building.storeys <= 3 and corner[2] < CHIMNEY_M:
             self._draw_chimneys(canvas, building, corner, across)
 
     def _draw_mansard_end(
@@ -125,6 +127,7 @@ def _quad(corner: Points, across: Points, up: Points) -> Points:
 
 def _faces_camera(corner: Points, across: Points, down: Points) -> bool:
     """Return whether the upper side of a slope is seen from the camera."""
-    normal = np.cross(across, down)
-    upward = normal if normal[1] < 0 else -normal
-    return bool(upward @ corner < 0)
+    (ax, ay, az), (dx, dy, dz) = across.tolist(), down.tolist()
+    upwards = az * dx - ax * dz
+    normal = np.array([ay * dz - az * dy, upwards, ax * dy - ay * dx])
+    return bool((normal @ corner) * upwards > 0)

@@ -22,7 +22,9 @@ def sun_along(street: Street, s: float) -> tuple[float, float]:
     return math.cos(angle), math.sin(angle)
 
 
-def lamp_light(lamps: tuple[Lamp, ...], s: Metres, d: Metres, z: Metres, power: float) -> FloatArray:
+def lamp_light(
+    lamps: tuple[Lamp, ...], s: Metres, d: Metres, z: Metres, power: float
+) -> FloatArray:
     """Return the light of street lamps at places (any shape), shape (..., 3)."""
     total = np.zeros(np.broadcast(s, d, z).shape)
     for lamp in lamps:

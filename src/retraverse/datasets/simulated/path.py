@@ -51,4 +51,5 @@ def make_centre_line(seed: int, length_m: float) -> CentreLine:
         stretch, phase = rng.uniform(0.8, 1.2), rng.uniform(0, 2 * np.pi)
         curvature += np.sin(2 * np.pi * s / (wavelength * stretch) + phase) / radius
     heading = np.cumsum(curvature)
-    return CentreLine(s=s, x=np.cumsum(np.cos(heading)), y=np.cumsum(np.sin(heading)), heading=heading)
+    x, y = np.cumsum(np.cos(heading)), np.cumsum(np.sin(heading))
+    return CentreLine(s=s, x=x, y=y, heading=heading)

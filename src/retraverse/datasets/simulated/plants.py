@@ -13,7 +13,7 @@ from retraverse.datasets.simulated.canvas import Texture
 from retraverse.datasets.simulated.conditions import Look
 from retraverse.datasets.simulated.noise import blend, fractal_noise
 from retraverse.datasets.simulated.things import Barrier, BarrierKind, TreeKind
-from retraverse.types import FloatArray, ImageArray
+from retraverse.types import Array, FloatArray, ImageArray
 
 __all__ = ["SPRITE_ASPECT", "paint_barrier", "paint_tree"]
 
@@ -128,21 +128,22 @@ def _draw_leaves(
 ) -> None:  # fmt: skip
     """Draw the leaves that are left: dark ones first, those in the light last."""
     tips = np.array([twig.end for twig in twigs if twig.depth >= 3])
-    tufts = max(3, 1500 // len(tips))
+    tufts = max(3, 2200 // len(tips))
     count = len(tips) * tufts
-    places = np.repeat(tips, tufts, axis=0) + rng.normal(0, 14.0, (count, 2))
-    sizes, order = rng.uniform(3.5, 9.0, count), rng.random(count)
+    places = np.repeat(tips, tufts, axis=0) + rng.normal(0, 17.0, (count, 2))
+    sizes, order = rng.uniform(2.5, 7.0, count), rng.random(count)
     own, tint = rng.normal(0, 0.1, count), rng.integers(4)
     left = order < look.leaves
     centre, extent = tips.mean(axis=0), tips.std(axis=0) + 1
     across, down = ((places - centre) / extent).T
-    light = 0.92 - 0.20 * down - 0.10 * across + own
+    light = 0.95 - 0.20 * down - 0.10 * across + own
     green = np.array(SUMMER[int(tint)], np.float32)
     turned = np.array(TURNED[int(tint)], np.float32)
     leaf = blend(green, turned, look.autumn)
     for k in np.argsort(light):
         if left[k]:
-            _blob(colours, alpha, places[k], sizes[k], leaf * np.float32(np.clip(light[k], 0.4, 1.4)))
+            shade = np.float32(np.clip(light[k], 0.4, 1.4))
+            _blob(colours, alpha, places[k], sizes[k], leaf * shade)
 
 
 def _blob(
@@ -158,9 +159,7 @@ def _blob(
     cv2.ellipse(alpha, at, axes, float(place[0] * 7 % 180), 0, 360, 255, -1)
 
 
-def _conifer(
-    colours: ImageArray, alpha: ImageArray, rng: np.random.Generator, look: Look
-) -> None:
+def _conifer(colours: ImageArray, alpha: ImageArray, rng: np.random.Generator, look: Look) -> None:
     """Draw a fir: drooping tufts in rows, wider below; it stays green, and snow lies on it."""
     import cv2
 
@@ -223,7 +222,7 @@ def paint_barrier(barrier: Barrier, look: Look) -> Texture:
 
 def _barrier_body(
     kind: BarrierKind, shape: tuple[int, int], barrier: Barrier, look: Look
-) -> tuple[FloatArray, ImageArray]:
+) -> tuple[Array, ImageArray]:
     """Return the colours and the alpha of a barrier without snow."""
     rows, columns = shape
     alpha = np.full(shape, 255, np.uint8)

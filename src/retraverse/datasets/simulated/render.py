@@ -40,6 +40,8 @@ POSTS = {"bin": (1.05, 0.55, (58, 74, 60)), "bollard": (0.95, 0.16, (60, 60, 64)
 """Height, width and colour of small things on the pavement."""
 PLATES = (((170, 34, 36), (226, 226, 222)), ((36, 70, 140), (52, 92, 170)))
 """Rim and face of traffic signs."""
+SMALL_M, CARS_M = 75.0, 130.0
+"""Signs and parked cars farther away are left out."""
 TREE_FORMS = 14
 """How many different sprites of each kind of tree a street has."""
 
@@ -92,6 +94,8 @@ class Painter:
         sky = self._sky_window.cut(self._panorama, view.heading, view.pitch)
         canvas.pixels[: len(sky)] = sky
         self._ground.paint(canvas)
+        if self.look.wet > 0:
+            canvas.bare_ground = canvas.pixels.copy()
         here = view.position_m
         seen: list[Seen | Mover] = list(self._scene.seen(view, here - 2, here + VIEW_M))
         seen += [mover for mover in traffic.movers(frame) if mover.key_m > here - 4]
@@ -123,16 +127,19 @@ class Painter:
 
     def _draw_parked(self, canvas: Canvas, car: ParkedCar, seen: Seen, traffic: Traffic) -> None:
         body = traffic.parked_body(car)
-        if body is not None:
+        if body is not None and seen.anchors[0, 2] < CARS_M:
             turn = canvas.view.heading - seen.heading + math.pi * (car.lateral_m < 0)
             light = self._light(canvas.view, car.key_m, car.lateral_m)
-            draw_vehicle(canvas, vehicle_body(body), Place(*seen.anchors[0].tolist(), turn, light))
+            right, down, forward = seen.anchors[0].tolist()
+            place = Place(right, down, forward, turn, light)
+            draw_vehicle(canvas, vehicle_body(body), place)
 
     def _draw_mover(self, canvas: Canvas, mover: Mover) -> None:
         view, s, d = canvas.view, mover.key_m, mover.lateral_m
-        spot = view.to_camera(self.street.line.points(s, d))[0].tolist()
+        right, down, forward = view.to_camera(self.street.line.points(s, d))[0].tolist()
         turn = view.heading - float(self.street.line.heading_at(s)) + math.pi * mover.is_oncoming
-        place = Place(*spot, turn, self._light(view, s, d), is_moving=True)
+        light = self._light(view, s, d)
+        place = Place(right, down, forward, turn, light, is_moving=True)
         if mover.kind == "person":
             draw_person(canvas, mover.seed, place, mover.phase)
         else:
@@ -186,7 +193,7 @@ class Painter:
 
     def _draw_sign(self, canvas: Canvas, sign: Sign, foot: Points) -> None:
         """Draw a traffic sign on its post, or a bin, bollard or cabinet."""
-        if foot[2] < NEAR_M:
+        if not NEAR_M < foot[2] < SMALL_M:
             return
         tall, wide, tone = POSTS.get(sign.kind, (2.4, 0.07, (120, 122, 124)))
         colour = np.array(tone, np.float32)
@@ -205,7 +212,8 @@ def _pole(foot: Points, height: float, width: float) -> list[Points]:
     """Return an upright post that tapers, and its lit edge: two faces of four corners."""
     side, up = np.array([width / 2, 0.0, 0.0]), np.array([0.0, -height, 0.0])
     post = np.array([foot - side, foot + side, foot + up + side * 0.7, foot + up - side * 0.7])
-    edge = np.array([foot - side, foot - side * 0.3, foot + up - side * 0.2, foot + up - side * 0.7])
+    edge = np.array([foot - side, foot - side * 0.3,
+                     foot + up - side * 0.2, foot + up - side * 0.7])  # fmt: skip
     return [post, edge]
 
 

@@ -33,7 +33,7 @@ def paint_panorama(seed: int, sun_azimuth: float, look: Look) -> ImageArray:
         _add_stars(sky, seed, look)
     for layer in range(3):
         _add_skyline(sky, seed, layer, look)
-    return np.clip(sky, 0, 255).astype(np.uint8)
+    return np.asarray(np.clip(sky, 0, 255).astype(np.uint8))
 
 
 def _add_sun_glare(sky: FloatArray, elevation: FloatArray, turn: FloatArray, look: Look) -> None:
@@ -142,5 +142,6 @@ class SkyWindow:
         # A pitch upwards moves the horizon down: the same row then shows a higher place.
         up = min(max(round(pitch * (ROWS - 1) / (HIGH - LOW)), -PAD), PAD)
         window = padded[PAD - up : ROWS + 3 * PAD - up, left : left + self._width]
-        return np.asarray(cv2.remap(window, *self._maps, cv2.INTER_LINEAR,
-                                    borderMode=cv2.BORDER_REPLICATE))  # fmt: skip
+        first, second = self._maps
+        return np.asarray(cv2.remap(window, first, second, cv2.INTER_LINEAR,
+                                    borderMode=cv2.BORDER_REPLICATE), np.uint8)  # fmt: skip

@@ -15,6 +15,14 @@ from typing import Literal
 import numpy as np
 
 from retraverse.datasets.simulated.path import CentreLine, make_centre_line
+from retraverse.datasets.simulated.styles import (
+    ROOF_COLOURS,
+    STYLES,
+    TRIMS,
+    WALL_COLOURS,
+    District,
+    Style,
+)
 from retraverse.datasets.simulated.things import (
     Barrier,
     BarrierKind,
@@ -23,12 +31,10 @@ from retraverse.datasets.simulated.things import (
     Ground,
     Lamp,
     ParkedCar,
-    RoofKind,
     Sign,
     Thing,
     Tree,
     TreeKind,
-    WallKind,
 )
 from retraverse.errors import ConfigError
 
@@ -39,49 +45,8 @@ VIEW_M = 190.0
 """How far ahead things are painted."""
 DISTRICT_M = 85.0
 
-District = Literal["suburb", "terrace", "town", "modern"]
 
-
-@dataclass(frozen=True)
-class Style:
-    """What houses of a district have in common."""
-
-    widths: tuple[float, float]
-    storeys: tuple[int, int]
-    setbacks: tuple[float, float]
-    walls: tuple[WallKind, ...]
-    roofs: tuple[RoofKind, ...]
-    shops: float
-    gap: float
-    """Chance that a plot holds no house."""
-    spacing: tuple[float, float]
-    """Metres between neighbours."""
-
-
-STYLES: dict[District, Style] = {
-    "suburb": Style((9, 13), (1, 2), (3.5, 7.0), ("plaster", "brick", "timber"),
-                    ("ridge", "gable", "ridge"), 0.0, 0.14, (2.0, 5.0)),
-    "terrace": Style((6, 10), (2, 3), (0.0, 1.6), ("brick", "brick", "plaster"),
-                     ("ridge", "ridge", "gable"), 0.12, 0.08, (0.0, 0.0)),
-    "town": Style((9, 17), (3, 5), (0.0, 0.6), ("plaster", "plaster", "brick"),
-                  ("mansard", "flat", "ridge"), 0.55, 0.07, (0.0, 0.0)),
-    "modern": Style((14, 24), (2, 5), (1.0, 5.0), ("panel", "panel", "brick"),
-                    ("flat", "flat", "ridge"), 0.35, 0.18, (1.0, 5.0)),
-}  # fmt: skip
-
-WALL_COLOURS: dict[WallKind, tuple[Colour, ...]] = {
-    "brick": ((150, 84, 66), (172, 108, 82), (128, 78, 68), (186, 150, 112), (118, 96, 88)),
-    "plaster": ((222, 208, 178), (206, 186, 160), (196, 202, 196), (214, 180, 140),
-                (186, 198, 208), (220, 214, 206), (204, 160, 140), (180, 188, 150)),
-    "panel": ((180, 184, 186), (146, 152, 158), (204, 200, 192), (116, 124, 132), (172, 150, 128)),
-    "timber": ((176, 190, 200), (206, 200, 178), (146, 104, 78), (120, 140, 132)),
-}  # fmt: skip
-TRIMS: tuple[Colour, ...] = ((238, 236, 230), (226, 220, 206), (92, 84, 78), (60, 66, 70))
-ROOF_COLOURS: tuple[Colour, ...] = ((142, 76, 58), (110, 66, 56), (84, 86, 92), (66, 68, 74),
-                                    (120, 104, 92))  # fmt: skip
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Street:
     """A street from 0 to `length_m` with its surroundings; see `make_street`."""
 
@@ -108,7 +73,9 @@ class Street:
 
     def grounds_between(self, start_m: float, end_m: float) -> tuple[Ground, ...]:
         """Return the plots' grounds that overlap the stretch."""
-        return tuple(g for g in self.grounds if g.end_m > start_m and g.start_m < end_m)
+        low = bisect_left(self.grounds, start_m - 40.0, key=lambda ground: ground.start_m)
+        high = bisect_left(self.grounds, end_m, key=lambda ground: ground.start_m)
+        return tuple(ground for ground in self.grounds[low:high] if ground.end_m > start_m)
 
 
 def make_street(seed: int = 0, length_m: float = 240.0) -> Street:
@@ -130,8 +97,8 @@ def make_street(seed: int = 0, length_m: float = 240.0) -> Street:
     ConfigError
         `seed` is negative or `length_m` is out of range.
     """
-    if seed < 0:
-        raise ConfigError(f"street seed is {seed}; expected an integer from 0")
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise ConfigError(f"street seed is {seed!r}; expected an integer from 0")
     if not 10.0 <= length_m <= 1e5:
         raise ConfigError(f"street length_m is {length_m!r}; expected 10 to 100000 metres")
     line = make_centre_line(seed, length_m)
@@ -309,7 +276,7 @@ def _kerbside(seed: int, side: int, end_m: float, grounds: list[Ground]) -> list
     def is_free(s: float) -> bool:
         return not any(a - 1.5 < s < b + 1.5 for a, b in openings)
 
-    things = [
+    things: list[Thing] = [
         *_lamps(seed, side, end_m),
         *_street_trees(seed, side, end_m),
         *_parked_cars(seed, side, end_m),

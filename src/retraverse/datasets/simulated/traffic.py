@@ -19,7 +19,7 @@ from retraverse.datasets.simulated.things import ParkedCar
 
 __all__ = ["Mover", "Traffic"]
 
-ONCOMING_S, LEADER_S, WALKER_M = 2.4, 11.0, 8.0
+ONCOMING_S, LEADER_S, WALKER_M = 2.0, 9.0, 6.0
 """Seconds between oncoming cars, seconds a car stays ahead, metres between walkers."""
 
 
@@ -77,7 +77,7 @@ class Traffic:
     def _oncoming(self, now: float, here: float) -> Iterator[Mover]:
         for k in range(math.floor(now / ONCOMING_S) - 4, math.floor(now / ONCOMING_S) + 9):
             rng = np.random.default_rng([self.seed, 81, k + 1000])
-            if rng.random() < 0.8 * self.amount:
+            if rng.random() < 0.9 * self.amount:
                 meets = (k + float(rng.uniform(0.1, 0.6))) * ONCOMING_S
                 s = self._camera_at(meets) + 9.0 * (meets - now)
                 if -8 < s - here < 150:
@@ -88,7 +88,7 @@ class Traffic:
         """Yield the car ahead: it comes from afar, stays close, and draws away again."""
         slot = math.floor(now / LEADER_S)
         rng = np.random.default_rng([self.seed, 82, slot + 1000])
-        if rng.random() < 0.75 * self.amount:
+        if rng.random() < 0.85 * self.amount:
             part = now / LEADER_S - slot
             nearest = float(rng.uniform(7.5, 14))
             gap = nearest + 75 * (1 - math.sin(math.pi * part)) ** 1.6
@@ -98,7 +98,7 @@ class Traffic:
         for k in range(math.floor((here - 16) / WALKER_M), math.floor((here + 70) / WALKER_M)):
             for side in (-1, 1):
                 rng = np.random.default_rng([self.seed, 83, side + 1, k + 1000])
-                if rng.random() < 0.6 * self.amount:
+                if rng.random() < 0.75 * self.amount:
                     home = (k + float(rng.random())) * WALKER_M
                     speed = float(rng.choice([-1, 1]) * rng.uniform(0.9, 1.6))
                     passing = int(np.argmin(np.abs(self._positions - home))) * self._frame_s

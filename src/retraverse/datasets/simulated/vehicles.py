@@ -21,6 +21,7 @@ PAINTS = ((186, 188, 192), (226, 226, 226), (36, 38, 42), (92, 96, 102), (138, 3
           (34, 60, 112), (58, 84, 74), (160, 150, 130), (152, 104, 62), (70, 110, 150),
           (206, 208, 210), (60, 62, 68))  # fmt: skip
 GLASS = (58, 68, 78)
+SNOW = np.array([236, 240, 246], np.float32)
 FAR_M = 45.0
 """Beyond this a vehicle is drawn without wheels' rims and lamps."""
 
@@ -86,7 +87,8 @@ class Place:
     def camera_local(self) -> tuple[float, float]:
         """Return the camera's x and y in the solid's own axes."""
         cosine, sine = math.cos(self.turn), math.sin(self.turn)
-        return -self.right * cosine + self.forward * sine, -self.right * sine - self.forward * cosine
+        x = -self.right * cosine + self.forward * sine
+        return x, -self.right * sine - self.forward * cosine
 
 
 @dataclass
@@ -121,6 +123,9 @@ def draw_vehicle(canvas: Canvas, body: Body, place: Place) -> None:
     side = 0 if abs(x) < 0.4 * body.width else int(math.copysign(1, x))
     end = 0 if abs(y) < body.length / 2 else int(math.copysign(1, y))
     corners, counts, colours = _vehicle_faces(body, side, end, place.forward > FAR_M)
+    if canvas.look.snow > 0 and not place.is_moving:
+        colours = colours.copy()
+        colours[-1] += np.float32(0.9 * canvas.look.snow) * (SNOW - colours[-1])
     canvas.faces(place.to_camera(corners), counts, colours * place.light)
     if place.is_moving and canvas.look.darkness > 0.2:
         _draw_lamps(canvas, body, place, faces_rear=y < 0)
@@ -244,7 +249,8 @@ def draw_person(canvas: Canvas, seed: int, place: Place, phase: float) -> None:
     if place.forward < NEAR_M + 0.3:
         return
     rng = np.random.default_rng([seed, 41])
-    coat, trousers = rng.integers(30, 190, 3).tolist(), rng.integers(25, 90, 3).tolist()
+    coat = (float(rng.uniform(36, 150)) + rng.normal(0, 20, 3)).tolist()
+    trousers = (float(rng.uniform(30, 90)) + rng.normal(0, 8, 3)).tolist()
     tone, tall = float(rng.uniform(0.5, 1.0)), float(rng.uniform(0.92, 1.06))
     skin = (204 * tone, 164 * tone, 138 * tone)
     sleeve = tuple(0.8 * value for value in coat)

@@ -164,7 +164,8 @@ def _speeds(path: IntArray, stretch: int) -> NDArray[np.float64]:
         return np.zeros(0)
     frames = np.arange(known[0], known[-1] + 1)
     place = np.interp(frames, known, path[known])
-    return np.asarray((place[stretch - 1 :] - place[: len(place) - stretch + 1]) / (stretch - 1))
+    n_stretches = max(0, len(place) - stretch + 1)
+    return np.asarray((place[stretch - 1 :] - place[:n_stretches]) / (stretch - 1))
 
 
 def _absent_share(unknown: BoolArray, shortest: int) -> float:

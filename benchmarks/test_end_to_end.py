@@ -1,0 +1,54 @@
+"""Files to matches: the whole of Corridor, dynamic windows, against its parts' floor.
+
+Needs ../shared/data/corridor (or RETRAVERSE_DATA). The limits are 8 s in float32 and 3 s in int8 on
+two cores; the authors' program takes about 9 minutes on a like machine (not measured here). The
+ratio is to the same job done pair by pair with NumPy's product and maximum, timed on every
+tenth frame pair of the same run and scaled up.
+"""
+
+import os
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import retraverse as rt
+from retraverse.techniques import Descriptions
+
+BASE = Path(os.environ.get("RETRAVERSE_DATA", Path(__file__).parents[2] / "shared" / "data"))
+CORRIDOR = BASE / "corridor"
+pytestmark = pytest.mark.skipif(not CORRIDOR.is_dir(), reason="data/corridor is not here")
+
+
+def files_to_matches(precision: str) -> rt.Matches:
+    technique = rt.technique("convsequential", precision=precision)
+    route = rt.build_map(rt.open_traverse(CORRIDOR / "reference"), technique)
+    query = rt.open_traverse(CORRIDOR / "query")
+    return rt.match(query, route, sequence_length="dynamic")
+
+
+def seconds_pair_by_pair() -> float:
+    """Return the time of all 111 x 111 pairs by `dot` and `max`, from a tenth of them."""
+    technique = rt.technique("convsequential")
+    frames = rt.open_traverse(CORRIDOR / "query")[:12]
+    described = Descriptions.stack(
+        (technique.describe(technique.read(frame)) for frame in frames), technique.layout
+    ).descriptor
+    started = time.perf_counter()
+    for query in described:
+        for reference in described[:10]:
+            np.dot(query, reference.T).max(axis=1).mean()
+    return (time.perf_counter() - started) * 111 * 111 / (len(described) * 10)
+
+
+@pytest.mark.parametrize(("precision", "limit_s"), [("float32", 8.0), ("int8", 3.0)])
+def test_corridor_from_files_to_matches(benchmark: Any, precision: str, limit_s: float) -> None:
+    matches = benchmark.pedantic(files_to_matches, args=(precision,), rounds=3, warmup_rounds=1)
+    assert len(matches) == 97
+    benchmark.extra_info["limit_s"] = limit_s
+    benchmark.extra_info["pairwise NumPy, matching alone / ours, whole job"] = round(
+        seconds_pair_by_pair() / benchmark.stats.stats.min, 1
+    )
+    benchmark.extra_info["share of the limit"] = round(benchmark.stats.stats.min / limit_s, 2)
