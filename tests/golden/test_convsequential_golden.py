@@ -47,7 +47,7 @@ def test_dynamic_windows_answers_and_scores(corridor: Corridor, shared: Shared) 
 def test_sequential_entropy(corridor: Corridor, shared: Shared) -> None:
     expected = golden(shared("golden/convseqslam_dynamic_corridor.csv"))
     route, queries = corridor
-    overlap = Overlap(route.technique, queries)  # type: ignore[arg-type]
+    overlap = Overlap(route.technique, queries)
     windows = dynamic_windows(queries.arrays["entropy"], overlap, GrowthRule())
     entropies = [window.sequential_entropy for window in windows]
     np.testing.assert_allclose(entropies, expected[:, 4], atol=1e-5)

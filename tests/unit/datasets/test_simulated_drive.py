@@ -277,7 +277,8 @@ def test_a_failure_leaves_nothing_behind(
     error: BaseException,
     is_there: bool,
 ) -> None:
-    save, written = Image.Image.save, []
+    save = Image.Image.save
+    written: list[Path] = []
 
     def fail_late(picture: Image.Image, path: Path, **options: object) -> None:
         if len(written) == 2:

@@ -63,12 +63,12 @@ class FakeTechnique:
 @contextmanager
 def fake_registered() -> Iterator[None]:
     """List the fake technique while the block runs, so that maps of it load by name."""
-    registry._discover()
+    registry.techniques()
     registry.register(FakeParameters)(FakeTechnique)
     try:
         yield
     finally:
-        del registry._registry["fake"]
+        del registry._registry._entries["fake"]
 
 
 def frames(n_frames: int, *, variant: int = 0, first: int = 0) -> list[Frame]:

@@ -49,7 +49,8 @@ class Balanced:
     def match(self, similarity: FloatArray, sequence_length: int) -> Matches:
         """See `Matcher.match`."""
         scores = checked_similarity(similarity)
-        check_lengths_fit(*scores.shape, sequence_length)
+        n_queries, n_references = scores.shape
+        check_lengths_fit(n_queries, n_references, sequence_length)
         matches = Mean().match(self._balanced(scores), sequence_length)
         says_nothing = np.ptp(scores, axis=1).max(initial=0) == 0
         return matches.refuse(np.full(len(matches), says_nothing))
