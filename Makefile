@@ -23,8 +23,8 @@ test-full: .venv/test
 
 # The NumPy twins of the kernels, although the compiled ones are there.
 test-twin: .venv/test
-	RETRAVERSE_KERNELS=numpy $(PYTEST) -q -n 2 tests/unit/kernels tests/unit/matching \
-		tests/unit/techniques tests/oracle tests/golden tests/contract tests/cli
+	RETRAVERSE_KERNELS=numpy $(PYTEST) -q -n 2 tests/unit/kernels tests/unit/techniques \
+		tests/oracle tests/golden tests/contract
 
 # Install and run where no C++ compiler is, and no extra either.
 test-no-compiler:

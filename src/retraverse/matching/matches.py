@@ -56,6 +56,15 @@ class Matches:
         return np.asarray(self.reference != NO_MATCH)
 
     @property
+    def are_diagonals(self) -> bool:
+        """Whether every window runs from the frame it names, one reference per frame.
+
+        So do those of the mean; lines of other speeds and paths through the drive do not.
+        """
+        within = self.query + self.sequence_length <= self.n_queries
+        return self.followed is None and bool(within.all())
+
+    @property
     def frame_reference(self) -> IntArray:
         """(n_queries,) the reference each query frame belongs to; -1 = none.
 

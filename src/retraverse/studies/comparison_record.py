@@ -156,9 +156,12 @@ class ComparisonRecord:
         The answer's mean single-frame score over its window less the best mean of any reference
         window that starts more than `apart` frames (or K, where that is more) from it; where the
         answer was "no match", the best window takes the answer's place. About 0: another place
-        looks as good. NaN where the map is too short to have a rival. Matchers that weigh a
-        window's frames differently may prefer an answer of negative margin.
+        looks as good. NaN where the map is too short to have a rival, and for all answers that are
+        not of diagonals (`Matches.are_diagonals`). Matchers that weigh a window's frames
+        differently may prefer an answer of negative margin.
         """
+        if not self.matches.are_diagonals:
+            return np.full(len(self.matches), np.nan, np.float32)
         margins = [
             self._margin(int(query), int(reference), int(length), apart)
             for query, reference, length in zip(

@@ -52,6 +52,12 @@ def test_trajectories_say_where_each_frame_is() -> None:
     assert matches.refuse(np.array([True, False])).frame_reference.tolist() == [-1, -1, 4, 6]
 
 
+def test_diagonals_are_told_from_lines_and_paths() -> None:
+    assert windows([0, 1], [4, 5], 3, 4).are_diagonals
+    assert not windows([0, 1], [4, 5], 3, 3).are_diagonals
+    assert not windows([1, 2], [3, 4], 2, 4, followed=np.array([2, 3, 4, 6])).are_diagonals
+
+
 def test_frames_of_frames_are_the_same_frames() -> None:
     once = windows([0, 1], [4, 5], 3, 6).by_frame()
     np.testing.assert_array_equal(once.by_frame().reference, once.reference)
