@@ -5,6 +5,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# New examples at every run at a desk, the same ones in continuous integration; a failure prints
+# what reproduces it. No deadline: machines are shared, and speed has benchmarks.
+settings.register_profile("desk", deadline=None, print_blob=True)
+settings.register_profile("ci", deadline=None, print_blob=True, derandomize=True)
+settings.load_profile("ci" if os.environ.get("CI") == "true" else "desk")
 
 ROOT = Path(__file__).resolve().parents[1]
 
