@@ -13,7 +13,9 @@ from retraverse.cli.options import (
     JsonOutput,
     MatcherName,
     MatcherSettings,
+    MinMotion,
     Radius,
+    Resolution,
     Settings,
     SkipBad,
     TechniqueName,
@@ -21,12 +23,13 @@ from retraverse.cli.options import (
     TruthPath,
     make_matcher,
     make_technique,
+    open_drive,
     read_sequence_length,
     read_truth,
 )
 from retraverse.cli.output import print_json, progress, remark
 from retraverse.files import check_writable_place
-from retraverse.images import Traverse, open_traverse
+from retraverse.images import Traverse
 from retraverse.studies import ComparePlan, ComparisonRecord
 from retraverse.studies import compare as compare_traverses
 from retraverse.types import Progress
@@ -42,6 +45,7 @@ def compare(
     radius: Radius = None,
     technique: TechniqueName = "convsequential",
     settings: Settings = None,
+    resolution: Resolution = None,
     matcher: MatcherName = "mean",
     matcher_settings: MatcherSettings = None,
     sequence_length: Annotated[
@@ -60,6 +64,7 @@ def compare(
     ),
     every: Every = 1,
     skip_bad: SkipBad = False,
+    min_motion: MinMotion = 0.0,
     json_output: JsonOutput = False,
 ) -> None:
     """Locate one drive on another and write a report.
@@ -69,7 +74,7 @@ def compare(
     """
     check_writable_place(out)
     plan = ComparePlan(
-        technique=make_technique(technique, settings),
+        technique=make_technique(technique, settings, resolution),
         sequence_length=read_sequence_length(
             sequence_length or ("dynamic" if matcher == "mean" else "10")
         ),
@@ -78,8 +83,10 @@ def compare(
         command=shlex.join(["retraverse", *sys.argv[1:]]),
     )
     show = progress()
-    reference_traverse = open_traverse(reference, every=every, skip_bad=skip_bad, progress=show)
-    query_traverse = open_traverse(query, every=every, skip_bad=skip_bad, progress=show)
+    reference_traverse, query_traverse = (
+        open_drive(source, every=every, skip_bad=skip_bad, min_motion=min_motion, progress=show)
+        for source in (reference, query)
+    )
     record = compare_traverses(
         reference_traverse,
         query_traverse,

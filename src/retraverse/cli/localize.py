@@ -10,15 +10,16 @@ from retraverse.cli.options import (
     JsonOutput,
     MatcherName,
     MatcherSettings,
+    MinMotion,
     SequenceLengthText,
     SkipBad,
     Threshold,
     make_matcher,
+    open_drive,
     read_sequence_length,
 )
 from retraverse.cli.output import print_json, progress, remark
 from retraverse.files import check_writable_place
-from retraverse.images import open_traverse
 from retraverse.maps import load_map
 from retraverse.matching import match, save_matches
 
@@ -37,15 +38,16 @@ def localize(
     threshold: Threshold = None,
     every: Every = 1,
     skip_bad: SkipBad = False,
+    min_motion: MinMotion = 0.0,
     json_output: JsonOutput = False,
 ) -> None:
     """Locate a drive on a map and write the matches as CSV."""
     check_writable_place(out)
     show = progress()
     loaded = load_map(route, progress=show)
-    traverse = open_traverse(query, every=every, skip_bad=skip_bad, progress=show)
-    for frame in traverse.skipped:
-        remark(f"left out {frame.name}: {frame.reason}")
+    traverse = open_drive(
+        query, every=every, skip_bad=skip_bad, min_motion=min_motion, progress=show
+    )
     matches = match(
         traverse,
         loaded,

@@ -8,14 +8,16 @@ import typer
 from retraverse.cli.options import (
     Every,
     JsonOutput,
+    MinMotion,
+    Resolution,
     Settings,
     SkipBad,
     TechniqueName,
     make_technique,
+    open_drive,
     positions_of,
 )
-from retraverse.cli.output import print_json, print_table, progress, remark
-from retraverse.images import Traverse, open_traverse
+from retraverse.cli.output import print_json, print_table, progress
 from retraverse.maps import RouteMap, build_map, load_map
 
 __all__ = ["app"]
@@ -35,6 +37,7 @@ def build(
     out: Annotated[Path, typer.Option("--out", "-o", help="The map to write, a folder.")],
     technique: TechniqueName = "convsequential",
     settings: Settings = None,
+    resolution: Resolution = None,
     thumbnails: Annotated[
         int | None,
         typer.Option("--thumbnails", help="Keep pictures, longest side this many pixels."),
@@ -43,13 +46,16 @@ def build(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a map there.")] = False,
     every: Every = 1,
     skip_bad: SkipBad = False,
+    min_motion: MinMotion = 0.0,
     json_output: JsonOutput = False,
 ) -> None:
     """Describe a drive and write it as a route map."""
-    traverse = _open(source, every, skip_bad)
+    traverse = open_drive(
+        source, every=every, skip_bad=skip_bad, min_motion=min_motion, progress=progress()
+    )
     route = build_map(
         traverse,
-        make_technique(technique, settings),
+        make_technique(technique, settings, resolution),
         path=out,
         thumbnails=thumbnails,
         positions=None if positions is None else positions_of(traverse, positions),
@@ -72,24 +78,20 @@ def extend(
     positions: Positions = None,
     every: Every = 1,
     skip_bad: SkipBad = False,
+    min_motion: MinMotion = 0.0,
     json_output: JsonOutput = False,
 ) -> None:
     """Add the frames of a further drive to the end of a map."""
     route = load_map(path, progress=progress())
-    traverse = _open(source, every, skip_bad)
+    traverse = open_drive(
+        source, every=every, skip_bad=skip_bad, min_motion=min_motion, progress=progress()
+    )
     route.extend(
         traverse,
         positions=None if positions is None else positions_of(traverse, positions),
         progress=progress(),
     )
     _print_info(route, json_output)
-
-
-def _open(source: str, every: int, skip_bad: bool) -> Traverse:
-    traverse = open_traverse(source, every=every, skip_bad=skip_bad, progress=progress())
-    for frame in traverse.skipped:
-        remark(f"left out {frame.name}: {frame.reason}")
-    return traverse
 
 
 def _print_info(route: RouteMap, json_output: bool) -> None:

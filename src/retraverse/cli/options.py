@@ -7,11 +7,13 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
+from retraverse.cli.output import remark
 from retraverse.datasets import GroundTruth, aligned, from_positions, ground_truth, load_positions
 from retraverse.errors import ConfigError, InputError
-from retraverse.images import Traverse
+from retraverse.images import Traverse, open_traverse, without_stops
 from retraverse.matching.matchers import Matcher, matcher
 from retraverse.techniques import Technique, technique
+from retraverse.types import Progress
 
 __all__ = [
     "Aligned",
@@ -19,7 +21,9 @@ __all__ = [
     "JsonOutput",
     "MatcherName",
     "MatcherSettings",
+    "MinMotion",
     "Radius",
+    "Resolution",
     "SequenceLengthText",
     "Settings",
     "SkipBad",
@@ -28,6 +32,7 @@ __all__ = [
     "TruthPath",
     "make_matcher",
     "make_technique",
+    "open_drive",
     "positions_of",
     "read_sequence_length",
     "read_truth",
@@ -53,6 +58,16 @@ SequenceLengthText = Annotated[
         "--sequence-length", "-k", help="Frames in a window: 1, a whole number, or dynamic."
     ),
 ]
+Resolution = Annotated[
+    int | None,
+    typer.Option("--resolution", help="Side in pixels that pictures are described at."),
+]
+MinMotion = Annotated[
+    float,
+    typer.Option(
+        "--min-motion", min=0, help="Leave out frames that changed less; 0.05 removes stops."
+    ),
+]
 Threshold = Annotated[
     float | None,
     typer.Option("--threshold", help="Answer “no match” where a window scores below this."),
@@ -76,9 +91,29 @@ Radius = Annotated[
 ]
 
 
-def make_technique(name: str, settings: list[str] | None) -> Technique:
-    """Return the technique with ``name=value`` settings applied."""
-    return technique(name, **_read_settings("--set", settings))
+def open_drive(
+    source: str, *, every: int, skip_bad: bool, min_motion: float, progress: Progress
+) -> Traverse:
+    """Return the frames of a drive that the options leave; what is left out is said."""
+    whole = open_traverse(source, every=every, skip_bad=skip_bad, progress=progress)
+    for frame in whole.skipped:
+        remark(f"left out {frame.name}: {frame.reason}")
+    moving = without_stops(whole, min_motion, progress=progress)
+    if len(moving) < len(whole):
+        remark(f"left out {len(whole) - len(moving)} of {len(whole)} frames of {whole.name}: stops")
+    return moving
+
+
+def make_technique(
+    name: str, settings: list[str] | None, resolution: int | None = None
+) -> Technique:
+    """Return the technique with ``name=value`` settings and ``--resolution`` applied."""
+    values = _read_settings("--set", settings)
+    if resolution is not None:
+        if "resolution" in values:
+            raise ConfigError("got --resolution and --set resolution=…, expected one of them")
+        values["resolution"] = str(resolution)
+    return technique(name, **values)
 
 
 def make_matcher(name: str, settings: list[str] | None) -> Matcher:
