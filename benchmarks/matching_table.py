@@ -11,6 +11,7 @@ three seeds are joined into one row of frames. K = 10 everywhere; all parameters
 """
 
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -89,7 +90,11 @@ def disturbed(
     return scores[np.ix_(resampling.frames, kept)], resampling.truth(drive.truth)
 
 
+Shares = dict[str, float]
+
+
 def main() -> None:
+    found: dict[tuple[str, str], list[Shares]] = {}
     for drive in drives():
         whole_line = WHOLE_LINE in drive.name
         profiles = ("constant", "varying") if whole_line else tuple(PROFILES)
@@ -102,18 +107,33 @@ def main() -> None:
         for name, parameters in TECHNIQUES:
             if whole_line and name not in ON_THE_WHOLE_LINE:
                 continue
-            print_technique(drive, name, parameters, profiles)
+            for profile, shares in print_technique(drive, name, parameters, profiles):
+                found.setdefault((profile, drive.name), []).append(shares)
+    print_summary(found)
+
+
+def print_summary(found: dict[tuple[str, str], list[Shares]]) -> None:
+    """Print the mean over techniques, by speed and drive."""
+    print("\n### Mean over techniques\n")
+    print(f"| speed | drive | techniques | {' | '.join(MATCHERS)} |")
+    print(f"|{'---|' * (len(MATCHERS) + 3)}")
+    for (profile, drive), rows in sorted(found.items()):
+        means = [float(np.mean([row[matcher] for row in rows])) for matcher in MATCHERS]
+        shown = " | ".join(f"{mean:.3f}" for mean in means)
+        print(f"| {profile} | {drive} | {len(rows)} | {shown} |")
 
 
 def print_technique(
     drive: Drive, name: str, parameters: dict[str, Any], profiles: tuple[str, ...]
-) -> None:
-    """Print one row per speed profile."""
+) -> Iterator[tuple[str, Shares]]:
+    """Print one row per speed profile and yield the shares it shows."""
     route = rt.build_map(drive.reference, rt.technique(name, **parameters))
     scores = rt.similarity(describe_query(drive.query, route), route)
     settings = "".join(f" {value}" for value in parameters.values())
     for profile in profiles:
-        seeds = SEEDS if profile != "constant" and len(scores) < 3000 else SEEDS[:1]
+        # A constant speed has nothing to draw, and the whole line is long enough for one seed.
+        long = len(drive.query) > 3000 and drive.spacing == 1
+        seeds = SEEDS[:1] if profile == "constant" or long else SEEDS
         right: dict[str, list[BoolArray]] = {matcher: [] for matcher in MATCHERS}
         for seed in seeds:
             plan = plan_resampling(len(drive.query), profile, spacing=drive.spacing, seed=seed)
@@ -122,6 +142,7 @@ def print_technique(
                 right[matcher].append(is_right(matrix, truth, matcher))
         joined = {matcher: np.concatenate(parts) for matcher, parts in right.items()}
         print(f"| {name}{settings} | {profile} | {cells(joined)} |", flush=True)
+        yield profile, {matcher: float(values.mean()) for matcher, values in joined.items()}
 
 
 def cells(right: dict[str, BoolArray]) -> str:
