@@ -1,6 +1,6 @@
-"""Files to matches: the whole of Corridor, dynamic windows, against its parts' floor.
+"""Files to matches: the whole of Corridor with dynamic windows, and the whole Nordland line.
 
-Needs ../shared/data/corridor (or RETRAVERSE_DATA). The limits are 8 s in float32 and 3 s in int8 on
+Needs ../shared/data/corridor and nordland_64x32 (or RETRAVERSE_DATA). The limits are 8 s in float32 and 3 s in int8 on
 two cores; the authors' program takes about 9 minutes on a like machine (not measured here). The
 ratio is to the same job done pair by pair with NumPy's product and maximum, timed on every
 tenth frame pair of the same run and scaled up.
@@ -19,7 +19,9 @@ from retraverse.techniques import Descriptions
 
 BASE = Path(os.environ.get("RETRAVERSE_DATA", Path(__file__).parents[2] / "shared" / "data"))
 CORRIDOR = BASE / "corridor"
-pytestmark = pytest.mark.skipif(not CORRIDOR.is_dir(), reason="data/corridor is not here")
+NORDLAND = BASE / "nordland_64x32"
+needs_corridor = pytest.mark.skipif(not CORRIDOR.is_dir(), reason="data/corridor is not here")
+needs_nordland = pytest.mark.skipif(not NORDLAND.is_dir(), reason="data/nordland_64x32 is not here")
 
 
 def files_to_matches(precision: str) -> rt.Matches:
@@ -43,6 +45,7 @@ def seconds_pair_by_pair() -> float:
     return (time.perf_counter() - started) * 111 * 111 / (len(described) * 10)
 
 
+@needs_corridor
 @pytest.mark.parametrize(("precision", "limit_s"), [("float32", 8.0), ("int8", 3.0)])
 def test_corridor_from_files_to_matches(benchmark: Any, precision: str, limit_s: float) -> None:
     matches = benchmark.pedantic(files_to_matches, args=(precision,), rounds=3, warmup_rounds=1)
@@ -52,3 +55,23 @@ def test_corridor_from_files_to_matches(benchmark: Any, precision: str, limit_s:
         seconds_pair_by_pair() / benchmark.stats.stats.min, 1
     )
     benchmark.extra_info["share of the limit"] = round(benchmark.stats.stats.min / limit_s, 2)
+
+
+def whole_line(name: str, parameters: dict[str, Any], matcher: str) -> rt.Matches:
+    route = rt.build_map(rt.open_traverse(NORDLAND / "summer"), rt.technique(name, **parameters))
+    query = rt.open_traverse(NORDLAND / "winter")
+    return rt.match(query, route, sequence_length=10, matcher=matcher)
+
+
+@needs_nordland
+@pytest.mark.parametrize(
+    ("name", "parameters", "matcher"),
+    [("patchnorm", {}, "seqslam"), ("hog", {"form": "chapter7", "resolution": 64}, "mean")],
+)
+def test_whole_nordland_line(
+    benchmark: Any, name: str, parameters: dict[str, Any], matcher: str
+) -> None:
+    arguments = (name, parameters, matcher)
+    matches = benchmark.pedantic(whole_line, args=arguments, rounds=2)
+    assert len(matches) > 3500
+    benchmark.extra_info["share of the limit of 8 s"] = round(benchmark.stats.stats.min / 8, 2)
