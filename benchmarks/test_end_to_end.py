@@ -1,7 +1,7 @@
 """Files to matches: the whole of Corridor with dynamic windows, and the whole Nordland line.
 
-Needs ../shared/data/corridor and nordland_64x32 (or RETRAVERSE_DATA). The limits are 8 s (int8: 3 s)
-on two cores; the authors' program takes about 9 minutes for Corridor on a like machine (not measured
+Needs ../shared/data/corridor and nordland_64x32 (or RETRAVERSE_DATA). The limits are 8 s, for
+int8 3 s, on two cores; the authors' program takes about 9 minutes for Corridor (not measured
 here). The ratio is to the same job done pair by pair with NumPy's product and maximum, timed on
 some of the frame pairs of the same run and scaled up.
 """
