@@ -93,7 +93,7 @@ class Auto:
         "the choice is retraverse's own"
     )
     cost: ClassVar[str] = "that of hmm with decode=viterbi, then that of the matcher picked"
-    assumes: ClassVar[str] = "the whole drive is there to look at"
+    assumes: ClassVar[str] = "the whole drive to look at, and single frames that are mostly right"
     frame_by_frame: ClassVar[bool] = False
 
     def __init__(self, parameters: AutoParameters | None = None) -> None:
