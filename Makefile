@@ -6,6 +6,9 @@ SOURCES := pyproject.toml constraints.txt $(wildcard src/kernels/*)
 # Where pip finds packages can be set with pip's own variables (PIP_INDEX_URL and so on).
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 PYTEST := $(BIN)/python -m pytest
+EXTRAS := test,learned,formats,video,cluster
+# An index that has torch's builds without CUDA: make test TORCH_INDEX=... (see the README).
+TORCH_INDEX ?=
 
 .PHONY: demo test test-full test-twin test-no-compiler check format docs bench clean
 
@@ -58,11 +61,11 @@ bench: .venv/test
 	touch $@
 
 .venv/test: .venv/python $(SOURCES)
-	$(PIP) --editable '.[test]'
+	$(PIP) $(if $(TORCH_INDEX),--extra-index-url $(TORCH_INDEX)) --editable '.[$(EXTRAS)]'
 	touch $@ .venv/core
 
 .venv/dev: .venv/test
-	$(PIP) --editable '.[test,dev]'
+	$(PIP) --editable '.[$(EXTRAS),dev]'
 	touch $@
 
 clean:
