@@ -11,7 +11,7 @@ import retraverse as rt
 from retraverse import kernels
 from retraverse.kernels import Motion, paths
 from retraverse.kernels.backend import native
-from retraverse.matching.matchers.evidence import standardise
+from retraverse.matching.matchers.evidence import drive_evidence, running_evidence
 from retraverse.matching.matchers.hmm import Hmm, HmmParameters, ViterbiSearch
 from retraverse.matching.matchers.trails import GraphTrail, lagged, whole
 
@@ -248,10 +248,47 @@ def test_lagged_answers_one_by_one(K: int, kind: str) -> None:
         assert score[frame] == pytest.approx(sum(seen) / max(len(seen), 1), abs=1e-5)
 
 
+def standard(values: Any, axis: int) -> Any:
+    return (values - values.mean(axis, keepdims=True)) / values.std(axis, keepdims=True)
+
+
 def test_evidence_by_its_definition() -> None:
     scores = normal(1, 6, 30) * 3 + 7
-    expected = (scores - scores.mean(axis=1, keepdims=True)) / scores.std(axis=1, keepdims=True)
-    np.testing.assert_allclose(standardise(scores), np.clip(expected, -5, 5), atol=1e-4)
+    expected = np.clip(standard(scores.astype(float), 1), -5, 5)
+    np.testing.assert_allclose(drive_evidence(scores, "row"), expected, atol=1e-4)
+    np.testing.assert_allclose(running_evidence(scores, "row"), expected, atol=1e-4)
+
+
+def test_balanced_evidence_by_its_definition() -> None:
+    # The prior is ten frames more of which five say +1 and five -1: mean 0 and deviation 1.
+    scores = normal(2, 40, 30) + np.linspace(0, 4, 30, dtype=np.float32)
+    prior = np.repeat([[1.0], [-1.0]], 5, axis=0) * np.ones(30)
+    rows = standard(scores.astype(float), 1)
+    seen = standard(np.concatenate([rows, prior]), 0)[: len(rows)]
+    expected = np.clip(standard(seen, 1), -5, 5)
+    np.testing.assert_allclose(drive_evidence(scores, "balanced"), expected, atol=1e-4)
+    for last in (1, 2, 17, 40):
+        so_far = drive_evidence(scores[:last], "balanced")[-1]
+        running = running_evidence(scores, "balanced")[last - 1]
+        np.testing.assert_allclose(running, so_far, atol=1e-4)
+
+
+def test_a_row_that_says_nothing_has_no_evidence() -> None:
+    scores = normal(4, 20, 30) + np.linspace(0, 4, 30, dtype=np.float32)
+    scores[7] = 3.0
+    for evidence in (drive_evidence(scores, "balanced"), running_evidence(scores, "balanced")):
+        assert not evidence[7].any()
+        assert evidence[8].any()
+
+
+def test_a_reference_that_looks_like_everything_loses_its_hold() -> None:
+    scores = normal(5, 60, 40)
+    scores[np.arange(40), np.arange(40)] += 2
+    scores[:, 11] += 4
+    told = drive_evidence(scores, "row").argmax(axis=1)
+    balanced = drive_evidence(scores, "balanced").argmax(axis=1)
+    assert (told == 11).mean() > 0.8
+    assert (balanced == 11).mean() < 0.1
 
 
 @pytest.mark.parametrize("decode", ["filter", "smooth", "viterbi", "lag"])

@@ -8,13 +8,10 @@ from numpy.typing import NDArray
 
 from retraverse.errors import ConfigError
 from retraverse.matching.checks import check_lengths_fit, checked_similarity
+from retraverse.matching.matchers.balanced import Balanced, BalancedParameters
 from retraverse.matching.matchers.base import Matcher, OnlineMatcher
-from retraverse.matching.matchers.evidence import standardise
-from retraverse.matching.matchers.hmm import Hmm, HmmParameters, ViterbiSearch
-from retraverse.matching.matchers.mean import Mean
+from retraverse.matching.matchers.hmm import Hmm, HmmParameters
 from retraverse.matching.matchers.registry import register
-from retraverse.matching.matchers.seqslam import SeqSlam
-from retraverse.matching.matchers.trails import whole
 from retraverse.matching.matches import Matches
 from retraverse.techniques.parameters import check_range, parameter
 from retraverse.types import BoolArray, FloatArray, IntArray
@@ -24,10 +21,9 @@ __all__ = ["Auto", "AutoParameters", "SpeedProfile", "speed_profile"]
 SHORTEST_STRETCH = 20
 """Speeds are read over at least so many frames: where the path is two frames off at each end, the
 speed is then 0.2 off."""
-STEADY_SPEEDS = 0.75, 1.25
-"""Speeds that SeqSLAM looks for, and one frame in a stretch of 20 on either side."""
-MAP_SPEED = 0.1
-"""Median speeds this near to 1 are the map's: a window of 10 drifts by less than one frame."""
+STEADY = 0.25
+"""A stretch this near to the median speed runs at it: one frame in a stretch of 20 on either side,
+and the fifth by which SeqSLAM's speeds differ."""
 
 
 @dataclass(frozen=True)
@@ -35,10 +31,10 @@ class AutoParameters:
     """Where one reason gives way to the next."""
 
     least_known: float = parameter(
-        0.3, "share of frames whose place must be known, else the mean is taken"
+        0.3, "share of frames whose place must be known, else the balanced mean is taken"
     )
     steady_share: float = parameter(
-        0.8, "share of stretches at speeds of about 0.8 to 1.2 from which a drive is steady"
+        0.8, "share of stretches near the median speed from which a drive is steady"
     )
     absent_share: float = parameter(
         0.05, "share of frames in long absences from which a drive leaves the map"
@@ -64,36 +60,38 @@ class SpeedProfile:
     nothing."""
 
     @property
-    def steady(self) -> float:
-        """Share of stretches within SeqSLAM's speeds."""
-        low, high = STEADY_SPEEDS
-        return float(((self.speed >= low) & (self.speed <= high)).mean()) if len(self.speed) else 0
-
-    @property
     def median(self) -> float:
         """Median speed; NaN where none is known."""
         return float(np.median(self.speed)) if len(self.speed) else float("nan")
 
+    @property
+    def steady(self) -> float:
+        """Share of stretches at about the median speed; 0 where no speed is known."""
+        return float((np.abs(self.speed - self.median) <= STEADY).mean()) if len(self.speed) else 0
+
 
 @register(AutoParameters)
 class Auto:
-    """Picks mean, seqslam or hmm (Viterbi) from the drive's own speed profile, and says why.
+    """Picks hmm (Viterbi) or the balanced mean by how the drive moves, and says why.
 
-    The profile is read off the likeliest path of a hidden Markov model through the whole matrix
-    (`speed_profile`): no labels, no other drive. Where too few places are known the mean is taken,
-    which asks least of a technique; where the drive leaves the map, hmm; at the map's own steady
-    speed the mean; at another steady one seqslam; at any other hmm. The choice and its reason are
-    the first of the matches' notes.
+    The speed profile is read off the likeliest path of a hidden Markov model through the whole
+    matrix (`speed_profile`): no labels, no other drive. Where the places of enough frames are
+    clear, that path is also the answer, at whatever speed the drive goes: on real drives it was
+    right more often than windows along diagonals even at the map's own speed (docs: matching).
+    Where they are not, a path may wander, and the balanced mean is taken, which asks least of a
+    technique. The choice and its reason are the first of the matches' notes.
     """
 
     name: ClassVar[str] = "auto"
-    summary: ClassVar[str] = "Picks mean, seqslam or hmm from the speed profile, and says why"
+    summary: ClassVar[str] = "Picks hmm or the balanced mean by how the drive moves, and says why"
     citation: ClassVar[str] = (
         "Profile: Rabiner, A tutorial on hidden Markov models, Proceedings of the IEEE, 1989; "
         "the choice is retraverse's own"
     )
-    cost: ClassVar[str] = "that of hmm with decode=viterbi, then that of the matcher picked"
-    assumes: ClassVar[str] = "the whole drive to look at, and single frames that are mostly right"
+    cost: ClassVar[str] = (
+        "that of hmm with decode=viterbi; where that is not picked, balanced's too"
+    )
+    assumes: ClassVar[str] = "the whole drive to look at"
     frame_by_frame: ClassVar[bool] = False
 
     def __init__(self, parameters: AutoParameters | None = None) -> None:
@@ -103,58 +101,55 @@ class Auto:
         """See `Matcher.match`."""
         scores = checked_similarity(similarity)
         check_lengths_fit(scores.shape[0], scores.shape[1], sequence_length)
-        chosen, reason = self.choose(speed_profile(scores, sequence_length))
-        if isinstance(chosen, SeqSlam) and len(scores) < chosen.lines(sequence_length).n_rows:
-            chosen, reason = Mean(), f"{reason}, but it is too short for seqslam"
-        matches = chosen.match(scores, sequence_length)
-        return replace(matches, notes=(f"auto picked {chosen.name}: {reason}.", *matches.notes))
+        path = Hmm(HmmParameters(decode="viterbi")).match(scores, sequence_length)
+        profile = speed_profile(path.reference, sequence_length)
+        unclear = self.why_unclear(profile)
+        if unclear:
+            other: Matcher = Balanced(BalancedParameters(over="drive"))
+            matches, name, reason = other.match(scores, sequence_length), other.name, unclear
+        else:
+            matches, name, reason = path, Hmm.name, self.describe(profile)
+        return replace(matches, notes=(f"auto picked {name}: {reason}.", *matches.notes))
 
     def online(self, n_references: int, sequence_length: int) -> OnlineMatcher:
         """Raise `ConfigError`: the profile is known when the drive has ended."""
         raise ConfigError("auto needs the whole drive; expected mean, seqslam, hmm or graph")
 
-    def choose(self, profile: SpeedProfile) -> tuple[Matcher, str]:
-        """Return the matcher for a profile, and why."""
-        limits = self.parameters
-        if profile.known < limits.least_known or not len(profile.speed):
-            return Mean(), (
-                f"the places of only {profile.known:.0%} of the frames are clear enough to read a "
-                "speed from"
-            )
-        if profile.absent > limits.absent_share:
-            return _any_speed(), f"the drive is off the map for {profile.absent:.0%} of its frames"
-        if profile.steady < limits.steady_share:
-            return _any_speed(), (
-                f"the speed changes: only {profile.steady:.0%} of the stretches run at about "
-                "0.8 to 1.2 times the map's"
-            )
-        if abs(profile.median - 1) > MAP_SPEED:
-            return SeqSlam(), f"the speed is a steady {profile.median:.2f} times the map's"
-        return Mean(), f"the speed is the map's ({profile.median:.2f} times)"
+    def why_unclear(self, profile: SpeedProfile) -> str:
+        """Return why the path is not to be trusted, or nothing."""
+        if profile.known >= self.parameters.least_known and len(profile.speed):
+            return ""
+        return (
+            f"the places of only {profile.known:.0%} of the frames are clear enough to read a "
+            "speed from"
+        )
+
+    def describe(self, profile: SpeedProfile) -> str:
+        """Return how the drive moves, in words."""
+        if profile.absent > self.parameters.absent_share:
+            return f"the drive is off the map for {profile.absent:.0%} of its frames"
+        if profile.steady < self.parameters.steady_share:
+            low, high = np.quantile(profile.speed, (0.1, 0.9))
+            return f"the speed changes: mostly {low:.1f} to {high:.1f} times the map's"
+        return f"the speed is a steady {profile.median:.2f} times the map's"
 
 
-def speed_profile(similarity: FloatArray, sequence_length: int) -> SpeedProfile:
+def speed_profile(path: IntArray, sequence_length: int) -> SpeedProfile:
     """Return how a drive moves over the map.
 
     Parameters
     ----------
-    similarity : float32 array, shape (Q, R)
-        Rows are queries; finite.
+    path : int array, shape (Q,)
+        Each query frame's reference on the likeliest path, -1 = none.
     sequence_length : int
         K: a stretch is K frames, but at least 20 (or the whole drive).
     """
-    evidence = standardise(similarity)
-    path, _ = whole(ViterbiSearch(Hmm(HmmParameters())).advance(evidence), evidence, 1)
     stretch = min(max(sequence_length, SHORTEST_STRETCH), len(path))
     return SpeedProfile(
         speed=_speeds(path, stretch),
         known=float((path >= 0).mean()),
         absent=_absent_share(path < 0, 2 * stretch),
     )
-
-
-def _any_speed() -> Hmm:
-    return Hmm(HmmParameters(decode="viterbi"))
 
 
 def _speeds(path: IntArray, stretch: int) -> NDArray[np.float64]:

@@ -9,7 +9,14 @@ from retraverse.errors import ConfigError
 from retraverse.kernels import dtw_steps
 from retraverse.matching.checks import check_lengths_fit, checked_similarity
 from retraverse.matching.matchers.base import OnlineMatcher
-from retraverse.matching.matchers.evidence import along, no_information, standardise, window_means
+from retraverse.matching.matchers.evidence import (
+    EvidenceKind,
+    along,
+    drive_evidence,
+    evidence_parameter,
+    no_information,
+    window_means,
+)
 from retraverse.matching.matchers.registry import register
 from retraverse.matching.matches import NO_MATCH, Matches
 from retraverse.techniques.parameters import parameter
@@ -25,6 +32,7 @@ class DtwParameters:
     scope: Literal["local", "global"] = parameter(
         "local", "the query is some part of the map; or the whole of it, from end to end"
     )
+    evidence: EvidenceKind = evidence_parameter()
 
 
 @register(DtwParameters)
@@ -62,7 +70,7 @@ class Dtw:
         scores = checked_similarity(similarity)
         n_queries, n_references = scores.shape
         check_lengths_fit(n_queries, n_references, sequence_length)
-        evidence = standardise(scores)
+        evidence = drive_evidence(scores, self.parameters.evidence)
         if no_information(evidence):
             reference = np.full(n_queries, NO_MATCH)
         else:

@@ -9,7 +9,14 @@ from retraverse.errors import ConfigError
 from retraverse.kernels import graph
 from retraverse.matching.checks import check_lengths_fit, checked_similarity
 from retraverse.matching.matchers.base import OnlineMatcher
-from retraverse.matching.matchers.evidence import no_information, standardise
+from retraverse.matching.matchers.evidence import (
+    EvidenceKind,
+    RunningEvidence,
+    drive_evidence,
+    evidence_parameter,
+    no_information,
+    running_evidence,
+)
 from retraverse.matching.matchers.motion import moves_within
 from retraverse.matching.matchers.registry import register
 from retraverse.matching.matchers.trails import GraphTrail, LaggedSearch, lagged, whole
@@ -43,6 +50,7 @@ class GraphParameters:
         5.0, "what it costs to come out of hiding, so that chance hits do not pay"
     )
     jump: float = parameter(10.0, "what it costs, in hiding, to go on anywhere on the map")
+    evidence: EvidenceKind = evidence_parameter()
 
     def __post_init__(self) -> None:
         check_range("fan_out", self.fan_out, 1, 30)
@@ -85,8 +93,9 @@ class Graph:
         scores = checked_similarity(similarity)
         n_queries, n_references = scores.shape
         check_lengths_fit(n_queries, n_references, sequence_length)
-        evidence = standardise(scores)
         is_lagged = self.parameters.decode == "lag"
+        weigh = running_evidence if is_lagged else drive_evidence
+        evidence = weigh(scores, self.parameters.evidence)
         trail = GraphSearch(self.parameters).advance(evidence)
         reference, score = (lagged if is_lagged else whole)(trail, evidence, sequence_length)
         ahead = sequence_length if is_lagged else n_queries
@@ -107,7 +116,8 @@ class Graph:
                 f"graph with decode {self.parameters.decode!r} needs the whole drive; expected "
                 "'lag' to run frame by frame"
             )
-        return LaggedSearch(GraphSearch(self.parameters), n_references, sequence_length)
+        evidence = RunningEvidence(n_references, self.parameters.evidence)
+        return LaggedSearch(GraphSearch(self.parameters), evidence, sequence_length)
 
 
 class GraphSearch:

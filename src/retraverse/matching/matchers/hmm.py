@@ -7,9 +7,15 @@ import numpy as np
 
 from retraverse.errors import ConfigError
 from retraverse.kernels import Motion, ViterbiRows, backward, forward, viterbi
-from retraverse.matching.checks import check_lengths_fit, check_row, checked_similarity
+from retraverse.matching.checks import check_lengths_fit, checked_similarity
 from retraverse.matching.matchers.base import Answer, OnlineMatcher
-from retraverse.matching.matchers.evidence import standardise
+from retraverse.matching.matchers.evidence import (
+    EvidenceKind,
+    RunningEvidence,
+    drive_evidence,
+    evidence_parameter,
+    running_evidence,
+)
 from retraverse.matching.matchers.motion import motion_model
 from retraverse.matching.matchers.registry import register
 from retraverse.matching.matchers.trails import LaggedSearch, ViterbiTrail, lagged, whole
@@ -42,6 +48,7 @@ class HmmParameters:
     jump: float = parameter(1e-3, "probability of going on anywhere else on the map")
     leave: float = parameter(1e-2, "probability of leaving the map")
     enter: float = parameter(1e-2, "probability, off the map, of coming (back) to it anywhere")
+    evidence: EvidenceKind = evidence_parameter()
 
     def __post_init__(self) -> None:
         check_range("back", self.back, 0, 30)
@@ -49,6 +56,11 @@ class HmmParameters:
         check_range("separation", self.separation, 0.01, 10)
         for name in ("jump", "leave", "enter"):
             check_range(name, getattr(self, name), 1e-12, 0.4)
+
+    @property
+    def needs_drive(self) -> bool:
+        """Whether no frame is answered before the drive has ended."""
+        return self.decode in ("viterbi", "smooth")
 
 
 @register(HmmParameters)
@@ -93,7 +105,8 @@ class Hmm:
         scores = checked_similarity(similarity)
         n_queries, n_references = scores.shape
         check_lengths_fit(n_queries, n_references, sequence_length)
-        evidence = standardise(scores)
+        weigh = drive_evidence if self.parameters.needs_drive else running_evidence
+        evidence = weigh(scores, self.parameters.evidence)
         decode = self.parameters.decode
         if decode in ("filter", "smooth"):
             reference, score = self._decode_beliefs(evidence, smooth=decode == "smooth")
@@ -117,7 +130,8 @@ class Hmm:
         if self.parameters.decode == "filter":
             return OnlineFilter(self, n_references)
         if self.parameters.decode == "lag":
-            return LaggedSearch(ViterbiSearch(self), n_references, sequence_length)
+            evidence = RunningEvidence(n_references, self.parameters.evidence)
+            return LaggedSearch(ViterbiSearch(self), evidence, sequence_length)
         raise ConfigError(
             f"hmm with decode {self.parameters.decode!r} needs the whole drive; expected 'filter' "
             "or 'lag' to run frame by frame"
@@ -241,13 +255,13 @@ class OnlineFilter:
 
     def __init__(self, hmm: Hmm, n_references: int) -> None:
         self._hmm = hmm
-        self._n_references = n_references
+        self._evidence = RunningEvidence(n_references, hmm.parameters.evidence)
         self._belief = hmm.prior(n_references)
         self._n_seen = 0
 
     def update(self, row: FloatArray) -> Answer:
         """See `OnlineMatcher.update`; every frame has an answer at once."""
-        evidence = standardise(check_row(row, self._n_references))
+        evidence = self._evidence.update(row)
         beliefs = self._hmm.filter_rows(evidence, self._belief, first=self._n_seen == 0)
         reference, score = self._hmm.decide(beliefs)
         self._n_seen += 1

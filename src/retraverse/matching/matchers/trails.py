@@ -12,9 +12,8 @@ from typing import Protocol
 import numpy as np
 
 from retraverse.kernels import GraphRows, ViterbiRows
-from retraverse.matching.checks import check_row
 from retraverse.matching.matchers.base import Answer
-from retraverse.matching.matchers.evidence import along, standardise, window_means
+from retraverse.matching.matchers.evidence import RunningEvidence, along, window_means
 from retraverse.matching.matches import NO_MATCH
 from retraverse.types import Array, FloatArray, IntArray
 
@@ -148,9 +147,9 @@ def lagged(trail: Trail, evidence: FloatArray, sequence_length: int) -> tuple[In
 class LaggedSearch:
     """A path search at work frame by frame; it keeps K rows."""
 
-    def __init__(self, search: PathSearch, n_references: int, sequence_length: int) -> None:
+    def __init__(self, search: PathSearch, weigh: RunningEvidence, sequence_length: int) -> None:
         self._search = search
-        self._n_references = n_references
+        self._weigh = weigh
         self._length = sequence_length
         self._trails: deque[Trail] = deque(maxlen=sequence_length)
         self._evidence: deque[Array] = deque(maxlen=sequence_length)
@@ -158,7 +157,7 @@ class LaggedSearch:
 
     def update(self, row: FloatArray) -> Answer | None:
         """See `OnlineMatcher.update`."""
-        evidence = standardise(check_row(row, self._n_references))
+        evidence = self._weigh.update(row)
         self._trails.append(self._search.advance(evidence))
         self._evidence.append(evidence)
         self._n_seen += 1
