@@ -88,9 +88,7 @@ class Auto:
         "Profile: Rabiner, A tutorial on hidden Markov models, Proceedings of the IEEE, 1989; "
         "the choice is retraverse's own"
     )
-    cost: ClassVar[str] = (
-        "that of hmm with decode=viterbi; where that is not picked, balanced's too"
-    )
+    cost: ClassVar[str] = "that of hmm with decode=viterbi, and balanced's where that is picked"
     assumes: ClassVar[str] = "the whole drive to look at"
     frame_by_frame: ClassVar[bool] = False
 

@@ -10,10 +10,10 @@ from retraverse.kernels import dtw_steps
 from retraverse.matching.checks import check_lengths_fit, checked_similarity
 from retraverse.matching.matchers.base import OnlineMatcher
 from retraverse.matching.matchers.evidence import (
+    EVIDENCE_HELP,
     EvidenceKind,
     along,
     drive_evidence,
-    evidence_parameter,
     no_information,
     window_means,
 )
@@ -32,7 +32,7 @@ class DtwParameters:
     scope: Literal["local", "global"] = parameter(
         "local", "the query is some part of the map; or the whole of it, from end to end"
     )
-    evidence: EvidenceKind = evidence_parameter()
+    evidence: EvidenceKind = parameter("balanced", EVIDENCE_HELP)
 
 
 @register(DtwParameters)

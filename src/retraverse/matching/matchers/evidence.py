@@ -21,22 +21,24 @@ import numpy as np
 
 from retraverse.matching.balance import PRIOR_FRAMES, RunningBalance
 from retraverse.matching.checks import check_row
-from retraverse.techniques.parameters import parameter
 from retraverse.types import Array, BoolArray, FloatArray, IntArray
 
 __all__ = [
+    "EVIDENCE_HELP",
     "LARGEST",
     "EvidenceKind",
     "RunningEvidence",
     "along",
     "drive_evidence",
-    "evidence_parameter",
     "no_information",
     "running_evidence",
     "window_means",
 ]
 
 EvidenceKind = Literal["balanced", "row"]
+EVIDENCE_HELP = (
+    "balanced: what a reference says of most queries is taken out; row: each query by itself"
+)
 
 LARGEST = 5.0
 """Evidence is cut off here on both sides, so that no single frame decides: more than 5 standard
@@ -46,15 +48,6 @@ FLAT = 1e-6
 rounding."""
 SMALLEST = 1e-37
 """Differences below this are lost in float32."""
-
-
-def evidence_parameter() -> EvidenceKind:
-    """Return the parameter that every matcher built on evidence has."""
-    kind: EvidenceKind = parameter(
-        "balanced",
-        "balanced: what a reference says of most queries is taken out; row: each query by itself",
-    )
-    return kind
 
 
 def drive_evidence(similarity: FloatArray, kind: EvidenceKind) -> FloatArray:

@@ -10,10 +10,10 @@ from retraverse.kernels import graph
 from retraverse.matching.checks import check_lengths_fit, checked_similarity
 from retraverse.matching.matchers.base import OnlineMatcher
 from retraverse.matching.matchers.evidence import (
+    EVIDENCE_HELP,
     EvidenceKind,
     RunningEvidence,
     drive_evidence,
-    evidence_parameter,
     no_information,
     running_evidence,
 )
@@ -50,7 +50,7 @@ class GraphParameters:
         5.0, "what it costs to come out of hiding, so that chance hits do not pay"
     )
     jump: float = parameter(10.0, "what it costs, in hiding, to go on anywhere on the map")
-    evidence: EvidenceKind = evidence_parameter()
+    evidence: EvidenceKind = parameter("balanced", EVIDENCE_HELP)
 
     def __post_init__(self) -> None:
         check_range("fan_out", self.fan_out, 1, 30)

@@ -10,10 +10,10 @@ from retraverse.kernels import Motion, ViterbiRows, backward, forward, viterbi
 from retraverse.matching.checks import check_lengths_fit, checked_similarity
 from retraverse.matching.matchers.base import Answer, OnlineMatcher
 from retraverse.matching.matchers.evidence import (
+    EVIDENCE_HELP,
     EvidenceKind,
     RunningEvidence,
     drive_evidence,
-    evidence_parameter,
     running_evidence,
 )
 from retraverse.matching.matchers.motion import motion_model
@@ -48,7 +48,7 @@ class HmmParameters:
     jump: float = parameter(1e-3, "probability of going on anywhere else on the map")
     leave: float = parameter(1e-2, "probability of leaving the map")
     enter: float = parameter(1e-2, "probability, off the map, of coming (back) to it anywhere")
-    evidence: EvidenceKind = evidence_parameter()
+    evidence: EvidenceKind = parameter("balanced", EVIDENCE_HELP)
 
     def __post_init__(self) -> None:
         check_range("back", self.back, 0, 30)
