@@ -16,6 +16,7 @@ from _real_sets import RealSet, accuracy, data_folder, real_sets
 
 import retraverse as rt
 from retraverse import kernels
+from retraverse.errors import InputError
 from retraverse.matching import (
     GrowthRule,
     calibrate_growth,
@@ -30,7 +31,7 @@ RUNS: dict[str, tuple[str, Mapping[str, Any], GrowthRule | None]] = {
     "hog": ("hog", {}, None),
     "gist": ("gist", {}, None),
     "orb": ("orb", {}, None),
-    "seqslam": ("seqslam", {}, None),
+    "patchnorm": ("patchnorm", {}, None),
     "sad": ("sad", {}, None),
     "regional HOG": ("cohog", {"grey": "decoder"}, None),
     "regional HOG, published": ("cohog", {"grey": "decoder"}, GrowthRule()),
@@ -49,7 +50,10 @@ def main() -> None:
         for label, (name, parameters, rule) in RUNS.items():
             if name in registered:
                 route = rt.build_map(real.reference, rt.technique(name, **parameters))
-                print_row(label, real, route, entropy, rule)
+                try:
+                    print_row(label, real, route, entropy, rule)
+                except InputError as error:
+                    print(f"| {real.name} | {label} | {error} ||||||||")
 
 
 def print_row(

@@ -26,7 +26,7 @@ OURS: dict[str, tuple[str, dict[str, Any]]] = {
     "cohog": ("cohog", {"precision": "int8"}),
     "gist": ("gist", {}),
     "orb": ("orb", {}),
-    "seqslam": ("seqslam", {}),
+    "patchnorm": ("patchnorm", {}),
     "sad": ("sad", {}),
 }
 MODES: tuple[FusionMode, ...] = get_args(FusionMode)
