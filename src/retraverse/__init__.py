@@ -23,7 +23,12 @@ if TYPE_CHECKING:
     from retraverse.matching import Matcher, Matches, match, match_similarity, similarity
     from retraverse.matching.matchers import matcher, matchers
     from retraverse.metrics import Evaluation, evaluate
-    from retraverse.techniques import Technique, technique, techniques
+    from retraverse.techniques import (
+        Technique,
+        technique,
+        technique_from_callable,
+        techniques,
+    )
 
 __all__ = [
     "Evaluation",
@@ -48,6 +53,7 @@ __all__ = [
     "open_traverse",
     "similarity",
     "technique",
+    "technique_from_callable",
     "techniques",
 ]
 
@@ -58,7 +64,7 @@ _ROOMS = {
     "matching": ("Matcher", "Matches", "match", "match_similarity", "similarity"),
     "matching.matchers": ("matcher", "matchers"),
     "metrics": ("Evaluation", "evaluate"),
-    "techniques": ("Technique", "technique", "techniques"),
+    "techniques": ("Technique", "technique", "technique_from_callable", "techniques"),
 }
 _HOMES = {name: room for room, names in _ROOMS.items() for name in names}
 

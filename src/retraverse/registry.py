@@ -7,6 +7,7 @@ know of them.
 
 import difflib
 import importlib
+import os
 import pkgutil
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields
@@ -141,6 +142,10 @@ def _read_value(owner: str, key: str, value: Any, hint: Any) -> Any:
             if value == choice or str(value) == str(choice):
                 return choice
         raise ConfigError(f"{what}, expected one of {', '.join(map(repr, choices))}")
+    if hint is str:
+        return _read_text(what, value)
+    if hint is bool:
+        return _read_flag(what, value)
     if isinstance(value, bool) or not isinstance(value, str | int | float):
         raise ConfigError(f"{what}, expected {hint.__name__}")
     try:
@@ -150,3 +155,24 @@ def _read_value(owner: str, key: str, value: Any, hint: Any) -> Any:
     if hint is int and not number.is_integer():
         raise ConfigError(f"{what}, expected a whole number")
     return hint(number)
+
+
+def _read_text(what: str, value: Any) -> str:
+    """Return text: as it is, or a path's."""
+    if not isinstance(value, str | os.PathLike):
+        raise ConfigError(f"{what}, expected text")
+    text = os.fspath(value)
+    if not isinstance(text, str) or not text.isprintable():
+        raise ConfigError(f"{what}, expected printable text")
+    return text
+
+
+def _read_flag(what: str, value: Any) -> bool:
+    """Return True or False, from itself or from the words that stand for it."""
+    word = str(value).lower()
+    if not isinstance(value, bool | str) or word not in _FLAGS:
+        raise ConfigError(f"{what}, expected one of {', '.join(_FLAGS)}")
+    return _FLAGS[word]
+
+
+_FLAGS = {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}

@@ -1,17 +1,51 @@
 """What every registered technique promises; a new technique is one row here: none, it is found."""
 
+import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import FrozenInstanceError, fields
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import retraverse as rt
-from retraverse.errors import ConfigError
+from retraverse.errors import ConfigError, DataMissingError
 from retraverse.images import Frame
-from retraverse.techniques import Descriptions, Technique
+from retraverse.techniques import (
+    BatchTechnique,
+    Descriptions,
+    FingerprintedTechnique,
+    Technique,
+)
+from retraverse.techniques.learned import LearnedTechnique
 
 NAMES = [info.name for info in rt.techniques()]
+WITH_WEIGHTS = [
+    info.name
+    for info in rt.techniques()
+    if "weights" in {parameter.name for parameter in info.parameters}
+]
+WEIGHT_FILES = {
+    "squeezenet": "weights/squeezenet/squeezenet_v1.0.npz",
+}
+"""Weights that no package brings, where data lie beside the project."""
+DATA = Path(os.environ.get("RETRAVERSE_DATA", Path(__file__).parents[3] / "shared" / "data"))
+
+
+def with_weights(name: str) -> Technique:
+    """Return a technique with its default weights, or those beside the project."""
+    file = DATA.resolve().parent / WEIGHT_FILES.get(name, "nothing")
+    return rt.technique(name, **({"weights": file} if file.is_file() else {}))
+
+
+def can_run(name: str) -> bool:
+    """Tell whether all that a technique needs is here: none is downloaded for a test."""
+    technique = with_weights(name)
+    try:
+        return not isinstance(technique, FingerprintedTechnique) or bool(technique.fingerprint())
+    except DataMissingError:
+        return False
 
 
 def pictures() -> list[Frame]:
@@ -32,9 +66,9 @@ def describe(technique: Technique, frames: list[Frame]) -> Descriptions:
     )
 
 
-@pytest.fixture(scope="module", params=NAMES)
+@pytest.fixture(scope="module", params=[name for name in NAMES if can_run(name)])
 def technique(request: pytest.FixtureRequest) -> Technique:
-    return rt.technique(request.param)
+    return with_weights(request.param)
 
 
 @pytest.fixture(scope="module")
@@ -110,6 +144,37 @@ def test_any_size_of_picture(technique: Technique, shape: tuple[int, ...]) -> No
     random = np.random.default_rng(7).integers(0, 256, shape).astype(np.uint8)
     described = describe(technique, [Frame.from_array(random, name="odd", index=0)])
     assert np.isfinite(described.descriptor).all()
+
+
+def test_batches_are_as_one_by_one(technique: Technique, described: Descriptions) -> None:
+    if not isinstance(technique, BatchTechnique):
+        pytest.skip(f"{technique.name} describes one picture at a time")
+    images = [technique.read(frame) for frame in pictures()]
+    together = Descriptions.stack(technique.describe_batch(images), technique.layout)
+    for name, array in described.arrays.items():
+        np.testing.assert_allclose(together.arrays[name], array, atol=2e-5)
+
+
+@pytest.mark.parametrize("name", WITH_WEIGHTS)
+def test_missing_weights_are_one_line_once_they_are_needed(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("RETRAVERSE_WEIGHTS", str(tmp_path))
+    technique = rt.technique(name, weights="never-heard-of")
+    assert hasattr(technique, "fingerprint")
+    wanted: list[Callable[[], object]] = [technique.fingerprint]
+    if isinstance(technique, LearnedTechnique):
+        wanted.append(lambda: describe(technique, pictures()[:1]))
+    if name != "onnx":  # what its graph gives is in the file alone
+        assert technique.layout.dimension > 0
+    for ask in wanted:
+        with pytest.raises(DataMissingError, match=r"weights|no file|bring") as caught:
+            ask()
+        assert "\n" not in str(caught.value)
+
+
+def test_some_learned_technique_runs_as_installed() -> None:
+    assert can_run("efficientnet")
 
 
 def test_no_frames_are_no_rows(technique: Technique, described: Descriptions) -> None:

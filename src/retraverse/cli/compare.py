@@ -16,6 +16,7 @@ from retraverse.cli.options import (
     MinMotion,
     Radius,
     Resolution,
+    RuntimeName,
     Settings,
     SkipBad,
     TechniqueName,
@@ -46,6 +47,7 @@ def compare(
     technique: TechniqueName = "convsequential",
     settings: Settings = None,
     resolution: Resolution = None,
+    runtime: RuntimeName = None,
     matcher: MatcherName = "mean",
     matcher_settings: MatcherSettings = None,
     sequence_length: Annotated[
@@ -74,7 +76,7 @@ def compare(
     """
     check_writable_place(out)
     plan = ComparePlan(
-        technique=make_technique(technique, settings, resolution),
+        technique=make_technique(technique, settings, resolution, runtime),
         sequence_length=read_sequence_length(
             sequence_length or ("dynamic" if matcher == "mean" else "10")
         ),

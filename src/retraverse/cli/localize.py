@@ -11,10 +11,12 @@ from retraverse.cli.options import (
     MatcherName,
     MatcherSettings,
     MinMotion,
+    RuntimeName,
     SequenceLengthText,
     SkipBad,
     Threshold,
     make_matcher,
+    on_runtime,
     open_drive,
     read_sequence_length,
 )
@@ -36,6 +38,7 @@ def localize(
     matcher_settings: MatcherSettings = None,
     sequence_length: SequenceLengthText = "10",
     threshold: Threshold = None,
+    runtime: RuntimeName = None,
     every: Every = 1,
     skip_bad: SkipBad = False,
     min_motion: MinMotion = 0.0,
@@ -45,6 +48,8 @@ def localize(
     check_writable_place(out)
     show = progress()
     loaded = load_map(route, progress=show)
+    if runtime is not None:
+        loaded = loaded.with_technique(on_runtime(loaded.technique, runtime))
     traverse = open_drive(
         query, every=every, skip_bad=skip_bad, min_motion=min_motion, progress=show
     )

@@ -10,6 +10,7 @@ from retraverse.cli.options import (
     JsonOutput,
     MinMotion,
     Resolution,
+    RuntimeName,
     Settings,
     SkipBad,
     TechniqueName,
@@ -38,6 +39,7 @@ def build(
     technique: TechniqueName = "convsequential",
     settings: Settings = None,
     resolution: Resolution = None,
+    runtime: RuntimeName = None,
     thumbnails: Annotated[
         int | None,
         typer.Option("--thumbnails", help="Keep pictures, longest side this many pixels."),
@@ -55,7 +57,7 @@ def build(
     )
     route = build_map(
         traverse,
-        make_technique(technique, settings, resolution),
+        make_technique(technique, settings, resolution, runtime),
         path=out,
         thumbnails=thumbnails,
         positions=None if positions is None else positions_of(traverse, positions),

@@ -1,5 +1,6 @@
 """Options that several verbs share, and how their text becomes values."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -24,6 +25,7 @@ __all__ = [
     "MinMotion",
     "Radius",
     "Resolution",
+    "RuntimeName",
     "SequenceLengthText",
     "Settings",
     "SkipBad",
@@ -32,9 +34,11 @@ __all__ = [
     "TruthPath",
     "make_matcher",
     "make_technique",
+    "on_runtime",
     "open_drive",
     "positions_of",
     "read_sequence_length",
+    "read_settings",
     "read_truth",
 ]
 
@@ -61,6 +65,10 @@ SequenceLengthText = Annotated[
 Resolution = Annotated[
     int | None,
     typer.Option("--resolution", help="Side in pixels that pictures are described at."),
+]
+RuntimeName = Annotated[
+    Literal["torch", "onnx"] | None,
+    typer.Option("--runtime", help="What runs the network of a learned technique."),
 ]
 MinMotion = Annotated[
     float,
@@ -105,23 +113,34 @@ def open_drive(
 
 
 def make_technique(
-    name: str, settings: list[str] | None, resolution: int | None = None
+    name: str,
+    settings: list[str] | None,
+    resolution: int | None = None,
+    runtime: str | None = None,
 ) -> Technique:
-    """Return the technique with ``name=value`` settings and ``--resolution`` applied."""
-    values = _read_settings("--set", settings)
-    if resolution is not None:
-        if "resolution" in values:
-            raise ConfigError("got --resolution and --set resolution=…, expected one of them")
-        values["resolution"] = str(resolution)
+    """Return the technique with ``name=value`` settings and the options beside them applied."""
+    values = read_settings("--set", settings)
+    for key, value in (("resolution", resolution), ("runtime", runtime)):
+        if value is None:
+            continue
+        if key in values:
+            raise ConfigError(f"got --{key} and --set {key}=…, expected one of them")
+        values[key] = str(value)
     return technique(name, **values)
+
+
+def on_runtime(described_by: Technique, runtime: str) -> Technique:
+    """Return the same technique run by another runtime."""
+    return technique(described_by.name, **{**asdict(described_by.parameters), "runtime": runtime})
 
 
 def make_matcher(name: str, settings: list[str] | None) -> Matcher:
     """Return the matcher with ``name=value`` settings applied."""
-    return matcher(name, **_read_settings("--matcher-set", settings))
+    return matcher(name, **read_settings("--matcher-set", settings))
 
 
-def _read_settings(option: str, settings: list[str] | None) -> dict[str, str]:
+def read_settings(option: str, settings: list[str] | None) -> dict[str, str]:
+    """Return NAME=VALUE texts as a dict; ConfigError if one has no ``=``."""
     values: dict[str, str] = {}
     for setting in settings or []:
         key, separator, value = setting.partition("=")

@@ -69,6 +69,10 @@ class Contents:
             return self.manifest.content_sha256
         return hashlib.sha256(b"".join(map(_content_digests, self.segments))).hexdigest()
 
+    def technique_record(self, technique: Technique) -> TechniqueRecord:
+        """Return what made these descriptions: as the disk says, else `technique`."""
+        return TechniqueRecord.of(technique) if self.manifest is None else self.manifest.technique
+
 
 def _content_digests(segment: Segment) -> bytes:
     """Return two digests a frame, its name's and its picture's, end to end."""
@@ -136,7 +140,7 @@ def write_contents(
         digest.update(_content_digests(segment))
     writer.commit(
         Manifest(
-            technique=TechniqueRecord.of(technique),
+            technique=contents.technique_record(technique),
             history=contents.history,
             content_sha256=digest.hexdigest(),
             position_columns=contents.position_columns,

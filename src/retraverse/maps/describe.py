@@ -19,7 +19,7 @@ from retraverse.errors import ConfigError, InputError
 from retraverse.images import Frame
 from retraverse.maps.frame_table import FrameRecord
 from retraverse.maps.thumbnails import ThumbnailSpec, encode_thumbnail
-from retraverse.techniques import Description, Technique
+from retraverse.techniques import BatchTechnique, Description, Technique
 from retraverse.types import Progress, no_progress
 
 __all__ = [
@@ -34,6 +34,8 @@ __all__ = [
 item_ = TypeVar("item_")
 result_ = TypeVar("result_")
 
+LEAST_FOR_BATCHES = 32
+"""Fewer frames than this are described one by one: measuring a batch would cost what it saves."""
 WAITING_PER_THREAD = 2
 """Pictures asked for ahead of the one awaited, per thread: enough to keep all of them busy."""
 
@@ -56,7 +58,8 @@ class DescribedFrame:
     thumbnail: bytes | None
     """A small JPEG file, if asked for."""
     describe_s: float
-    """Seconds that `Technique.describe` took (t_e), with the other threads running beside it."""
+    """Seconds that describing it took (t_e), with the other threads running beside it; in a
+    batch, its share."""
 
 
 def describe_traverse(
@@ -101,15 +104,18 @@ def describe_frames(
 ) -> Generator[DescribedFrame, None, None]:
     """Yield every frame described, with its record, content hash and thumbnail, in order.
 
-    Parameters and errors as in `describe_traverse`; memory holds two frames per thread.
+    Parameters and errors as in `describe_traverse`; memory holds two frames per thread, or two
+    batches where the technique is faster with several pictures at once.
     """
     n_frames = count_frames(frames)
+    size = _batch_size(technique, n_frames)
 
-    def describe(frame: Frame) -> DescribedFrame:
-        return _describe(frame, technique, thumbnails)
+    def describe(batch: list[Frame]) -> list[DescribedFrame]:
+        return _describe(batch, technique, thumbnails)
 
-    with closing(in_order(describe, frames, threads)) as described:
-        yield from progress(described, total=n_frames, label=f"describing with {technique.name}")
+    with closing(in_order(describe, _batches(frames, size), threads)) as described:
+        each = itertools.chain.from_iterable(described)
+        yield from progress(each, total=n_frames, label=f"describing with {technique.name}")
 
 
 def count_frames(frames: Frames) -> int:
@@ -131,21 +137,40 @@ def count_frames(frames: Frames) -> int:
     return len(frames)
 
 
+def _batch_size(technique: Technique, n_frames: int) -> int:
+    """Return how many frames are described at once: 1, unless the technique is faster so."""
+    if not isinstance(technique, BatchTechnique) or n_frames < LEAST_FOR_BATCHES:
+        return 1
+    return technique.batch_size()
+
+
+def _batches(frames: Iterable[Frame], size: int) -> Iterator[list[Frame]]:
+    source = iter(frames)
+    while batch := list(itertools.islice(source, size)):
+        yield batch
+
+
 def _describe(
-    frame: Frame, technique: Technique, thumbnails: ThumbnailSpec | None
-) -> DescribedFrame:
-    image = technique.read(frame)
+    frames: list[Frame], technique: Technique, thumbnails: ThumbnailSpec | None
+) -> list[DescribedFrame]:
+    images = [technique.read(frame) for frame in frames]
     began = time.perf_counter()
-    description = technique.describe(image)
-    describe_s = time.perf_counter() - began
-    return DescribedFrame(
-        # Not the frame itself: one of a video may hold its pixels.
-        record=FrameRecord(frame.name, frame.index, frame.timestamp_s),
-        description=description,
-        content=hashlib.sha256(frame.fingerprint()).digest(),
-        thumbnail=encode_thumbnail(frame.colour(), thumbnails) if thumbnails else None,
-        describe_s=describe_s,
-    )
+    if len(images) > 1 and isinstance(technique, BatchTechnique):
+        descriptions = technique.describe_batch(images)
+    else:
+        descriptions = [technique.describe(image) for image in images]
+    describe_s = (time.perf_counter() - began) / len(frames)
+    return [
+        DescribedFrame(
+            # Not the frame itself: one of a video may hold its pixels.
+            record=FrameRecord(frame.name, frame.index, frame.timestamp_s),
+            description=description,
+            content=hashlib.sha256(frame.fingerprint()).digest(),
+            thumbnail=encode_thumbnail(frame.colour(), thumbnails) if thumbnails else None,
+            describe_s=describe_s,
+        )
+        for frame, description in zip(frames, descriptions, strict=True)
+    ]
 
 
 def in_order(

@@ -25,7 +25,7 @@ from retraverse.maps.contents import (
 from retraverse.maps.describe import Frames, count_frames
 from retraverse.maps.frame_table import FrameTable, read_positions
 from retraverse.maps.manifest import FORMAT_VERSION
-from retraverse.maps.provenance import Provenance, TechniqueRecord
+from retraverse.maps.provenance import Provenance
 from retraverse.maps.segment import gather, split_small_end
 from retraverse.maps.storage import changing_map, new_map
 from retraverse.techniques import Descriptions, Technique
@@ -88,7 +88,7 @@ class RouteMap:
     def provenance(self) -> Provenance:
         """Where the map came from."""
         contents = self._contents
-        record = TechniqueRecord.of(self._technique)
+        record = contents.technique_record(self._technique)
         return Provenance(record, contents.history, contents.content_sha256)
 
     def with_technique(self, technique: Technique) -> "RouteMap":
@@ -167,7 +167,7 @@ class RouteMap:
         MapError
             If name, version or a parameter differs; names both.
         """
-        record = TechniqueRecord.of(self._technique)
+        record = self._contents.technique_record(self._technique)
         record.require(technique, "the map" if self._path is None else str(self._path))
 
     def save(

@@ -45,12 +45,18 @@ def similarity(
 def similarity_blocks(
     queries: Descriptions, route: RouteMap, *, progress: Progress = no_progress
 ) -> Iterator[tuple[int, FloatArray]]:
-    """Yield the similarity matrix some rows at a time, as (first query, float32 (B, R))."""
-    starts = range(0, len(queries), BLOCK_QUERIES)
+    """Yield the similarity matrix some rows at a time, as (first query, float32 (B, R)).
+
+    A technique with ``compares_whole_drives`` gets both drives whole, and gives one block.
+    """
+    whole = getattr(route.technique, "compares_whole_drives", False)
+    n_rows = max(1, len(queries)) if whole else BLOCK_QUERIES
+    starts = range(0, len(queries), n_rows)
     for start in progress(starts, total=len(starts), label="matching"):
-        block = queries[start : start + BLOCK_QUERIES]
+        block = queries[start : start + n_rows]
         rows = np.empty((len(block), len(route)), np.float32)
-        for first, references in route.blocks(BLOCK_BYTES):
+        parts = [(0, route.descriptions())] if whole else route.blocks(BLOCK_BYTES)
+        for first, references in parts:
             rows[:, first : first + len(references)] = route.technique.similarity(block, references)
         yield start, rows
 

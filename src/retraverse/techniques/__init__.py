@@ -9,12 +9,15 @@ from types import ModuleType
 
 from retraverse.techniques.base import (
     ArraySpec,
+    BatchTechnique,
     Description,
     Descriptions,
+    FingerprintedTechnique,
     Layout,
     RegionalTechnique,
     Technique,
 )
+from retraverse.techniques.from_callable import technique_from_callable
 from retraverse.techniques.registry import (
     ParameterInfo,
     TechniqueInfo,
@@ -25,8 +28,10 @@ from retraverse.techniques.registry import (
 
 __all__ = [
     "ArraySpec",
+    "BatchTechnique",
     "Description",
     "Descriptions",
+    "FingerprintedTechnique",
     "Layout",
     "ParameterInfo",
     "RegionalTechnique",
@@ -34,6 +39,7 @@ __all__ = [
     "TechniqueInfo",
     "register",
     "technique",
+    "technique_from_callable",
     "techniques",
 ]
 

@@ -7,7 +7,7 @@ Conventions
 - ``similarity[query, reference]``: rows are queries, higher is better.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, Protocol, runtime_checkable
 
@@ -19,8 +19,10 @@ from retraverse.types import Array, FloatArray, ImageArray
 
 __all__ = [
     "ArraySpec",
+    "BatchTechnique",
     "Description",
     "Descriptions",
+    "FingerprintedTechnique",
     "Layout",
     "RegionalTechnique",
     "Technique",
@@ -165,4 +167,26 @@ class RegionalTechnique(Technique, Protocol):
         self, query: Array, references: Array, weights: FloatArray
     ) -> FloatArray:
         """Return float32 (M, R): one query's regions against R references under M weightings."""
+        ...
+
+
+@runtime_checkable
+class BatchTechnique(Technique, Protocol):
+    """A technique that may describe several pictures at once faster than one by one."""
+
+    def batch_size(self) -> int:
+        """Return how many pictures at once are fastest; 1 where batches do not help."""
+        ...
+
+    def describe_batch(self, images: Sequence[ImageArray]) -> list[Description]:
+        """Return the descriptions that `describe` gives, within the rounding of floats."""
+        ...
+
+
+@runtime_checkable
+class FingerprintedTechnique(Technique, Protocol):
+    """A technique whose parameters only name a part of it, such as a file of trained weights."""
+
+    def fingerprint(self) -> str:
+        """Return the SHA-256 of that part's content, 64 hexadecimal digits."""
         ...

@@ -1,16 +1,32 @@
 """Helpers for the parameter dataclasses: a default with its help line, and range checks."""
 
-from dataclasses import field
+from dataclasses import field, fields
 from typing import Any
 
 from retraverse.errors import ConfigError
 
-__all__ = ["check_multiple", "check_range", "parameter"]
+__all__ = ["check_multiple", "check_range", "parameter", "uncompared_parameters"]
 
 
-def parameter(default: Any, help: str) -> Any:
-    """Return a dataclass field with a default and the line that lists show."""
-    return field(default=default, metadata={"help": help})
+def parameter(default: Any, help: str, *, compared: bool = True) -> Any:
+    """Return a dataclass field with a default and the line that lists show.
+
+    Parameters
+    ----------
+    default : value
+    help : str
+    compared : bool
+        False for what says how a descriptor is computed, not which one: a map made with another
+        value is still comparable. Such values are recorded in maps all the same.
+    """
+    return field(default=default, metadata={"help": help, "compared": compared})
+
+
+def uncompared_parameters(parameters: Any) -> frozenset[str]:
+    """Return the names of the fields of a parameter dataclass that do not change descriptors."""
+    return frozenset(
+        field.name for field in fields(parameters) if not field.metadata.get("compared", True)
+    )
 
 
 def check_range(name: str, value: float, low: float, high: float, why: str = "") -> None:

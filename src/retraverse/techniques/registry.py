@@ -4,10 +4,21 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from retraverse.errors import ConfigError
 from retraverse.registry import ParameterInfo, Registry, describe_parameters, read_parameters
 from retraverse.techniques.base import Technique
 
-__all__ = ["ParameterInfo", "TechniqueInfo", "register", "technique", "techniques"]
+__all__ = [
+    "CALLABLE_PREFIX",
+    "ParameterInfo",
+    "TechniqueInfo",
+    "register",
+    "technique",
+    "techniques",
+]
+
+CALLABLE_PREFIX = "callable:"
+"""Starts the names of techniques that are Python functions: no list can hold those."""
 
 
 @dataclass(frozen=True)
@@ -72,5 +83,15 @@ def technique(name: str, **parameters: Any) -> Technique:
     >>> technique("hog", form="chapter7", resolution=64).layout.dimension
     144
     """
+    if name.startswith(CALLABLE_PREFIX):
+        raise ConfigError(_given_again(name.removeprefix(CALLABLE_PREFIX)))
     info = _registry.entry(name)
     return info.factory(read_parameters(name, info.parameter_class, parameters))
+
+
+def _given_again(name: str) -> str:
+    """Say how a technique that is a function is had again."""
+    return (
+        f"the technique {name!r} is a Python function, which no map holds: give the same one "
+        f"again, technique_from_callable(function, name={name!r}, …), as load_map's technique"
+    )

@@ -1,7 +1,7 @@
 import itertools
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,8 @@ from retraverse.images import Frame
 from retraverse.maps import describe_frames, describe_traverse
 from retraverse.maps.describe import in_order
 from retraverse.maps.thumbnails import ThumbnailSpec
+from retraverse.techniques import Description
+from retraverse.types import ImageArray
 
 
 @pytest.mark.parametrize("threads", [1, 2, 7, None])
@@ -99,6 +101,45 @@ def test_described_frames_know_their_frame() -> None:
     assert [frame.record.timestamp_s for frame in got] == [None, 1 / 7, 2 / 7, None]
     assert len({frame.content for frame in got}) == 4
     assert all(frame.thumbnail is not None and frame.describe_s > 0 for frame in got)
+
+
+class InBatches(FakeTechnique):
+    """Describes up to five pictures at once, and notes how many it got."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.sizes: list[int] = []
+
+    def batch_size(self) -> int:
+        return 5
+
+    def describe_batch(self, images: Sequence[ImageArray]) -> list[Description]:
+        self.sizes.append(len(images))
+        return [self.describe(image) for image in images]
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_batches_give_every_frame_in_order(threads: int) -> None:
+    technique, drive = InBatches(), frames(33)
+    got = list(describe_frames(drive, technique, threads=threads))
+    assert sorted(technique.sizes, reverse=True) == [5] * 6 + [3]
+    assert [frame.record.name for frame in got] == [frame.name for frame in drive]
+    for frame, described in zip(drive, got, strict=True):
+        expected = FakeTechnique().describe(technique.read(frame))
+        assert np.array_equal(described.description["descriptor"], expected["descriptor"])
+    assert all(frame.describe_s > 0 for frame in got)
+
+
+def test_few_frames_are_not_worth_a_batch() -> None:
+    technique = InBatches()
+    assert len(list(describe_frames(frames(31), technique))) == 31
+    assert not technique.sizes
+
+
+def test_a_bad_frame_in_a_batch_names_itself() -> None:
+    bad = Frame.from_array(np.full((6, 8, 3), 255, np.uint8), name="white.jpg")
+    with pytest.raises(FrameReadError, match=r"white\.jpg"):
+        list(describe_traverse([*frames(33), bad, *frames(3)], InBatches()))
 
 
 def test_progress_watches_the_frames() -> None:
