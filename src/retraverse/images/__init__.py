@@ -8,6 +8,8 @@ Names
 - `GreyPath`, `ColourOrder`: the two ways to grey; the channel order of a user's arrays.
 - `decode_grey`, `decode_bgr`: the same decoding for bytes that came from elsewhere.
 - `without_stops`, `measure_motion`: a drive without the frames on which nothing moved.
+- `worsened`, `worsen_frame`, `worsen_each`, `Worsening`: pictures resized and compressed.
+- `Encoder`, `encode_jpeg`, `QuantisationTables`: JPEG and its options.
 - `natural_key`, `PICTURE_SUFFIXES`: how folders are listed.
 
 Importing this package loads neither OpenCV nor Pillow.
@@ -16,24 +18,45 @@ Importing this package loads neither OpenCV nor Pillow.
 from retraverse.images.decode import ColourOrder, GreyPath, decode_bgr, decode_grey
 from retraverse.images.files import PICTURE_SUFFIXES
 from retraverse.images.frame import Frame
+from retraverse.images.jpeg import Encoder, encode_jpeg
 from retraverse.images.ordering import natural_key
+from retraverse.images.quantisation import QuantisationTables
 from retraverse.images.sources import Source, open_traverse
 from retraverse.images.stops import MIN_MOTION, measure_motion, without_stops
 from retraverse.images.traverse import SkippedFrame, Traverse
+from retraverse.images.worsen import (
+    PictureCache,
+    WorsenedFrame,
+    Worsening,
+    frame_bytes,
+    worsen_each,
+    worsen_frame,
+    worsened,
+)
 
 __all__ = [
     "MIN_MOTION",
     "PICTURE_SUFFIXES",
     "ColourOrder",
+    "Encoder",
     "Frame",
     "GreyPath",
+    "PictureCache",
+    "QuantisationTables",
     "SkippedFrame",
     "Source",
     "Traverse",
+    "WorsenedFrame",
+    "Worsening",
     "decode_bgr",
     "decode_grey",
+    "encode_jpeg",
+    "frame_bytes",
     "measure_motion",
     "natural_key",
     "open_traverse",
     "without_stops",
+    "worsen_each",
+    "worsen_frame",
+    "worsened",
 ]

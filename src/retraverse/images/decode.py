@@ -28,6 +28,7 @@ __all__ = [
     "check_colour_order",
     "decode_bgr",
     "decode_grey",
+    "decode_native",
     "quiet_opencv",
     "to_grey",
     "to_rgb",
@@ -86,6 +87,24 @@ def decode_bgr(encoded: bytes) -> ImageArray:
     import cv2
 
     return _decode(encoded, cv2.IMREAD_COLOR)
+
+
+def decode_native(encoded: bytes) -> ImageArray:
+    """Return the picture in the bytes of a file as grey if the file is grey, else as BGR.
+
+    Returns
+    -------
+    picture : uint8 array, shape (height, width) or (height, width, 3)
+        Equal to `decode_grey` or `decode_bgr` of the same bytes. Palettes count as colour.
+
+    Raises
+    ------
+    FrameReadError
+        If the bytes are empty, truncated, damaged or no picture; the message is the reason.
+    """
+    import cv2
+
+    return _decode(encoded, cv2.IMREAD_ANYCOLOR)
 
 
 def to_grey(picture: ImageArray, order: ColourOrder) -> ImageArray:
