@@ -2,9 +2,10 @@
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from retraverse.errors import ConfigError, InputError, ShapeError
 from retraverse.metrics.checks import Float64Array
@@ -13,6 +14,8 @@ __all__ = ["Interval", "bootstrap_interval"]
 
 BATCH_VALUES = 1 << 20
 """Values that are drawn at once."""
+COUNTED_VALUES, COUNTED_RESAMPLES = 512, 2000
+"""Up to so many values and resamples the draws are kept, at most 8 MB each, for the next run."""
 
 
 @dataclass(frozen=True)
@@ -107,14 +110,43 @@ def bootstrap_interval(
 def _resampled_means(
     sample: Float64Array, n_resamples: int, block_length: int, seed: int
 ) -> Float64Array:
-    """Means of the resamples, shape (n_resamples,), drawn in batches of bounded size."""
+    """Means of the resamples, shape (n_resamples,)."""
+    if sample.size <= COUNTED_VALUES and n_resamples <= COUNTED_RESAMPLES:
+        counts = _draw_counts(sample.size, n_resamples, block_length, seed)
+        means: Float64Array = counts @ sample / sample.size
+        return means
+    draws = _draws(sample.size, n_resamples, block_length, seed)
+    return np.concatenate([sample[index].mean(axis=1) for index in draws])
+
+
+@lru_cache(maxsize=24)
+def _draw_counts(n_values: int, n_resamples: int, block_length: int, seed: int) -> Float64Array:
+    """How often each value is in each resample, (n_resamples, n_values).
+
+    The draws do not depend on the values: a study asks for the same ones in every run of a drive.
+    """
+    counts = [
+        _count_rows(index, n_values) for index in _draws(n_values, n_resamples, block_length, seed)
+    ]
+    return np.concatenate(counts)
+
+
+def _count_rows(index: NDArray[np.int64], n_values: int) -> Float64Array:
+    """How often each value is in each row of `index`: one count over all rows at once."""
+    shifted = index + n_values * np.arange(len(index))[:, np.newaxis]
+    counts = np.bincount(shifted.ravel(), minlength=len(index) * n_values)
+    return counts.reshape(len(index), n_values).astype(np.float64)
+
+
+def _draws(
+    n_values: int, n_resamples: int, block_length: int, seed: int
+) -> Iterator[NDArray[np.int64]]:
+    """Yield which values are drawn, int (rows, n_values), in batches of bounded size."""
     random = np.random.default_rng(seed)
-    n_blocks = -(-sample.size // block_length)
-    batch = max(1, BATCH_VALUES // sample.size)
-    means = []
+    n_blocks = -(-n_values // block_length)
+    batch = max(1, BATCH_VALUES // n_values)
     for start in range(0, n_resamples, batch):
         n_rows = min(batch, n_resamples - start)
-        first = random.integers(sample.size, size=(n_rows, n_blocks, 1))
-        index = (first + np.arange(block_length)).reshape(n_rows, -1) % sample.size
-        means.append(sample[index[:, : sample.size]].mean(axis=1))
-    return np.concatenate(means)
+        first = random.integers(n_values, size=(n_rows, n_blocks, 1))
+        index = (first + np.arange(block_length)).reshape(n_rows, -1) % n_values
+        yield index[:, :n_values]

@@ -1,0 +1,259 @@
+"""One task of a study: some frames of a drive, made worse in every way asked for, and described.
+
+All that several runs need of a frame is made once: it is read once, decoded once for each size,
+compressed once for each c, decoded once for each grey path, and described once by each technique.
+A technique that fails on a frame spoils its own results and nobody else's.
+"""
+
+import hashlib
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from retraverse.errors import InputError
+from retraverse.images import Frame, GreyPath
+from retraverse.images.pixels import Pixels
+from retraverse.images.worsen import Worsening, worsen_each
+from retraverse.studies.plan import TechniqueChoice
+from retraverse.techniques import Description, Descriptions, Technique
+from retraverse.techniques.picture_entropy import picture_entropy
+from retraverse.types import Array, ImageArray
+
+__all__ = [
+    "DescribeTask",
+    "Described",
+    "Wanted",
+    "describe_task",
+    "made_technique",
+    "one_line_reason",
+]
+
+BATCH_FRAMES = 8
+"""Frames whose pixels are held at once, at every c."""
+TIMES = "describe_s"
+"""Name of the array of seconds (t_e of every frame) beside a technique's own arrays."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """One cache entry to make."""
+
+    key: str
+    """Its key."""
+    worsening: Worsening
+    """What is done to the pictures."""
+    technique: TechniqueChoice | None
+    """Who describes them; None = their sizes, t_c and entropy."""
+    entropy: bool = False
+    """Whether the pictures' entropy is measured (without a technique)."""
+
+
+@dataclass(frozen=True)
+class DescribeTask:
+    """Frames of one drive and what is to be made of them."""
+
+    label: str
+    """For messages."""
+    frames: tuple[Frame, ...]
+    digests: tuple[bytes, ...]
+    """SHA-256 of every frame's fingerprint, as the keys were made with."""
+    wanted: tuple[Wanted, ...]
+
+    @property
+    def cost(self) -> int:
+        """About how long it takes, in pictures described."""
+        return len(self.frames) * len(self.wanted)
+
+
+@dataclass(frozen=True)
+class Described:
+    """What a task made."""
+
+    entries: Mapping[str, Mapping[str, Array]] = field(default_factory=dict)
+    """Key -> arrays of a cache entry, one row per frame."""
+    errors: Mapping[str, str] = field(default_factory=dict)
+    """Key -> why there is no entry, one line."""
+
+
+def describe_task(task: DescribeTask) -> Described:
+    """Return the entries of a task; what goes wrong is in `Described.errors`, not raised."""
+    makers = {wanted.key: _maker(wanted) for wanted in task.wanted}
+    try:
+        for start in range(0, len(task.frames), BATCH_FRAMES):
+            batch = slice(start, start + BATCH_FRAMES)
+            _add_batch(task.frames[batch], task.digests[batch], makers)
+    except Exception as error:
+        # Nobody can use a frame that cannot be read.
+        reason = one_line_reason(error)
+        return Described({}, dict.fromkeys(makers, reason))
+    return Described(
+        {key: maker.arrays() for key, maker in makers.items() if not maker.error},
+        {key: maker.error for key, maker in makers.items() if maker.error},
+    )
+
+
+@lru_cache(maxsize=16)
+def _made(name: str, parameters: tuple[tuple[str, Any], ...]) -> Technique:
+    return TechniqueChoice(name, dict(parameters)).make()
+
+
+def made_technique(choice: TechniqueChoice) -> Technique:
+    """Return the technique of a choice; its network is loaded once in this process."""
+    return _made(choice.name, tuple(sorted(choice.parameters.items())))
+
+
+_warm: set[int] = set()
+"""Techniques that have described something in this process."""
+
+
+class _PictureMaker:
+    """Sizes, t_c and entropy of pictures."""
+
+    def __init__(self, wanted: Wanted) -> None:
+        self.wanted = wanted
+        self.error = ""
+        self._rows: list[tuple[int, float, float]] = []
+
+    def add(self, frames: Sequence["_Picture"]) -> None:
+        for picture in frames:
+            entropy = picture_entropy(picture.frame.grey()) if self.wanted.entropy else np.nan
+            self._rows.append((picture.n_bytes, picture.compress_s, entropy))
+
+    def arrays(self) -> dict[str, Array]:
+        n_bytes, compress_s, entropy = zip(*self._rows, strict=True)
+        return {
+            "n_bytes": np.array(n_bytes, np.int64),
+            "compress_s": np.array(compress_s, np.float64),
+            "entropy": np.array(entropy, np.float64),
+        }
+
+
+class _DescriptionMaker:
+    """Descriptions of pictures by one technique, and the seconds each took.
+
+    One picture at a time, also where a technique takes several at once: how many are best is
+    measured on the machine, and the last digits would depend on it. It is what t_e means, too.
+    """
+
+    def __init__(self, wanted: Wanted, technique: Technique | None, error: str) -> None:
+        self.wanted = wanted
+        self.error = error
+        self._technique = technique
+        self._described: list[Description] = []
+        self._seconds: list[float] = []
+
+    def add(self, frames: Sequence["_Picture"]) -> None:
+        if self.error or self._technique is None:
+            return
+        done, names = len(self._described), [picture.frame.name for picture in frames]
+        try:
+            for picture in frames:
+                self._describe_one(self._technique.read(picture.frame))
+        except Exception as error:
+            at = min(len(self._described) - done, len(names) - 1)
+            self.error = f"{self._technique.name} on {names[at]}: {one_line_reason(error)}"
+
+    def _describe_one(self, image: ImageArray) -> None:
+        assert self._technique is not None
+        if id(self._technique) not in _warm:
+            self._technique.describe(image)  # The first call of a process also loads and imports.
+            _warm.add(id(self._technique))
+        began = time.perf_counter()
+        self._described.append(self._technique.describe(image))
+        self._seconds.append(time.perf_counter() - began)
+
+    def arrays(self) -> dict[str, Array]:
+        assert self._technique is not None
+        stacked = Descriptions.stack(self._described, self._technique.layout)
+        return {**stacked.arrays, TIMES: np.array(self._seconds, np.float64)}
+
+
+def _maker(wanted: Wanted) -> _PictureMaker | _DescriptionMaker:
+    if wanted.technique is None:
+        return _PictureMaker(wanted)
+    try:
+        return _DescriptionMaker(wanted, made_technique(wanted.technique), "")
+    except Exception as error:
+        return _DescriptionMaker(wanted, None, one_line_reason(error))
+
+
+@dataclass(frozen=True)
+class _Picture:
+    """One frame made worse in one way."""
+
+    frame: Frame
+    n_bytes: int
+    compress_s: float
+
+
+def _add_batch(
+    frames: Sequence[Frame],
+    digests: Sequence[bytes],
+    makers: Mapping[str, _PictureMaker | _DescriptionMaker],
+) -> None:
+    ways = list(dict.fromkeys(maker.wanted.worsening for maker in makers.values()))
+    rows = [_worsen(*pair, ways) for pair in zip(frames, digests, strict=True)]
+    for column, way in enumerate(ways):
+        pictures = [row[column] for row in rows]
+        for maker in makers.values():
+            if maker.wanted.worsening == way:
+                maker.add(pictures)
+
+
+def _worsen(frame: Frame, digest: bytes, ways: Sequence[Worsening]) -> list[_Picture]:
+    """Return a frame made worse in all ways, if it still is the one the keys were made with."""
+    known = replace(frame, pixels=_Remembered(frame.pixels))
+    if hashlib.sha256(known.fingerprint()).digest() != digest:
+        raise InputError(f"{frame.name} changed while the study ran; run it again")
+    # From here on its digest stands for it: hashed once, not once for each c.
+    known = replace(frame, pixels=_Remembered(known.pixels, digest))
+    return [
+        _Picture(
+            replace(worse.frame, pixels=_Remembered(worse.frame.pixels)),
+            worse.n_bytes,
+            worse.compress_s,
+        )
+        for worse in worsen_each(known, ways)
+    ]
+
+
+class _Remembered:
+    """Pixels of which nothing is read or decoded twice; arrays are shared, not to be written to."""
+
+    def __init__(self, pixels: Pixels, identity: bytes | None = None) -> None:
+        self._pixels = pixels
+        self._identity = identity
+        self._kept: dict[str, Any] = {}
+
+    def encoded(self) -> bytes | None:
+        """Return the bytes of the picture file, None where there is no such file."""
+        return self._once("encoded", self._pixels.encoded)  # type: ignore[no-any-return]
+
+    def grey(self, path: GreyPath) -> ImageArray:
+        """Return uint8 (height, width)."""
+        return self._once(path, lambda: self._pixels.grey(path))  # type: ignore[no-any-return]
+
+    def rgb(self) -> ImageArray:
+        """Return uint8 (height, width, 3)."""
+        return self._once("rgb", self._pixels.rgb)  # type: ignore[no-any-return]
+
+    def fingerprint(self) -> bytes:
+        """Return bytes that differ where the pixels do."""
+        if self._identity is not None:
+            return self._identity
+        return self._pixels.fingerprint()
+
+    def _once(self, what: str, make: Any) -> Any:
+        if what not in self._kept:
+            self._kept[what] = make()
+        return self._kept[what]
+
+
+def one_line_reason(error: BaseException) -> str:
+    """Return what went wrong in one line; other people's errors with their kind."""
+    text = " ".join(str(error).split()) or "no reason given"
+    return text if isinstance(error, InputError) else f"{type(error).__name__}: {text}"

@@ -1,0 +1,27 @@
+"""A process that runs a tiny study, to be killed: ``study_process.py DATA FOLDER [CACHE]``."""
+
+import sys
+from pathlib import Path
+
+from tests.unit.studies.tiny import tiny_plan, tiny_registered
+
+from retraverse.studies.engine import run_study
+
+PLAN = {
+    "compression": '{ levels = [10, 50, 90], pairs = ["grid"] }',
+    "sequence_lengths": '["1..4"]',
+}
+
+
+def main() -> None:
+    data, folder = map(Path, sys.argv[1:3])
+    cache = Path(sys.argv[3]) if len(sys.argv) > 3 else None
+    with tiny_registered():
+        plan = tiny_plan(data, **PLAN)
+        print("go", flush=True)
+        result = run_study(plan, folder, workers=0, cache=cache)
+    print(result.n_ok, result.n_kept, flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,246 @@
+"""The engine: every run once, nothing twice, the same records whoever computes them."""
+
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.unit.studies.tiny import hashes, tiny_plan, tiny_registered, write_dataset
+
+import retraverse as rt
+from retraverse.errors import InputError
+from retraverse.images.worsen import Worsening, frame_bytes, worsened
+from retraverse.metrics import evaluate
+from retraverse.studies.cache import StudyCache, load_matrix
+from retraverse.studies.engine import run_study
+from retraverse.studies.estimate import estimate_study
+from retraverse.studies.plan_file import PlanError
+from retraverse.studies.study_folder import read_study
+from retraverse.studies.work import plan_work
+
+
+@pytest.fixture(autouse=True)
+def _tiny() -> Iterator[None]:
+    with tiny_registered():
+        yield
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Path:
+    write_dataset(tmp_path / "data" / "noise", n_frames=40)
+    return tmp_path / "data"
+
+
+def test_records_are_those_of_the_library_by_hand(data: Path, tmp_path: Path) -> None:
+    hog = '[{ name = "hog", parameters = { resolution = 64 } }]'
+    plan = tiny_plan(data, sequence_lengths="[1, 4]", techniques=hog, modules="[]")
+    result = run_study(plan, tmp_path / "study", workers=0)
+    assert (result.n_runs, result.n_ok, result.n_described) == (8, 8, 160)
+    (dataset,) = plan.datasets
+    for record in read_study(tmp_path / "study"):
+        query, reference = (
+            worsened(drive, Worsening(compression=c))
+            for drive, c in (
+                (dataset.query(), record.compression_query),
+                (dataset.reference(), record.compression_reference),
+            )
+        )
+        route = rt.build_map(reference, rt.technique("hog", resolution=64))
+        scores = rt.similarity(query, route)
+        kept = load_matrix(tmp_path / "study" / "cache", record.similarity_key)
+        assert kept is not None
+        assert np.abs(kept - scores).max() < 1e-6
+        matches = rt.match(query, route, sequence_length=int(record.sequence_length))
+        expected = evaluate(matches, dataset.truth())
+        assert record.accuracy == expected.accuracy
+        assert (record.accuracy_low, record.accuracy_high) == tuple(expected.accuracy_interval)
+        assert record.auc == pytest.approx(expected.auc)
+        assert record.answer_reference == tuple(matches.reference)
+        assert record.answer_correct == tuple(expected.correct)
+        sizes = frame_bytes(query)
+        assert record.query_bytes_total == sizes.sum()
+        assert record.query_bytes_mean == pytest.approx(sizes.mean())
+        assert record.n_candidates == 40 - int(record.sequence_length) + 1
+        assert record.encode_s > 0 < record.match_s < record.vpr_s
+        provenance = json.loads(record.provenance)
+        assert provenance["query"]["sha256"] == dataset.query().content_hash()
+        assert provenance["reference"]["sha256"] == dataset.reference().content_hash()
+
+
+def test_dynamic_lengths_and_first_regions_as_by_hand(data: Path, tmp_path: Path) -> None:
+    plan = tiny_plan(
+        data,
+        techniques='[{ name = "convsequential", parameters = { resolution = 64 } }]',
+        sequence_lengths='[3, "dynamic"]',
+        compression='{ levels = ["none"] }',
+        modules="[]",
+    )
+    run_study(plan, tmp_path / "study", workers=0)
+    (dataset,) = plan.datasets
+    route = rt.build_map(dataset.reference(), rt.technique("convsequential", resolution=64))
+    by_length = {record.sequence_length: record for record in read_study(tmp_path / "study")}
+    for text, length in (("3", 3), ("dynamic", "dynamic")):
+        matches = rt.match(dataset.query(), route, sequence_length=length)  # type: ignore[arg-type]
+        assert by_length[text].answer_reference == tuple(matches.reference)
+        assert by_length[text].mean_sequence_length == matches.sequence_length.mean()
+    assert by_length["dynamic"].sequence_lengths == tuple(matches.sequence_length)
+
+
+def test_entropy_is_measured_where_asked(data: Path, tmp_path: Path) -> None:
+    plan = tiny_plan(data, entropy="true", sequence_lengths="[1]")
+    run_study(plan, tmp_path / "study", workers=0)
+    for record in read_study(tmp_path / "study"):
+        assert 0 < record.entropy_query_mean < 0.7925
+
+
+def test_dynamic_lengths_of_a_technique_without_entropy(data: Path, tmp_path: Path) -> None:
+    changes = {"sequence_lengths": '["dynamic"]', "compression": '{ levels = ["none"] }'}
+    hog = '[{ name = "hog", parameters = { resolution = 64 } }]'
+    plan = tiny_plan(data, techniques=hog, modules="[]", **changes)
+    run_study(plan, tmp_path / "study", workers=0)
+    (record,) = read_study(tmp_path / "study")
+    (dataset,) = plan.datasets
+    route = rt.build_map(dataset.reference(), rt.technique("hog", resolution=64))
+    matches = rt.match(dataset.query(), route, sequence_length="dynamic")
+    assert record.answer_reference == tuple(matches.reference)
+
+
+def test_worker_processes_give_the_same_records(data: Path, tmp_path: Path) -> None:
+    hog = '{ name = "hog", parameters = { resolution = 64 } }'
+    changes = {"techniques": f'["tiny", {hog}]', "matchers": '["mean", "seqslam", "hmm"]'}
+    plan = tiny_plan(data, **changes)
+    for workers in (0, 2):
+        result = run_study(plan, tmp_path / f"study {workers}", workers=workers)
+        assert result.n_ok == 72
+    here, there = (hashes(read_study(tmp_path / f"study {workers}")) for workers in (0, 2))
+    assert here == there
+
+
+def test_again_nothing_is_left_and_from_the_cache_nothing_is_described(
+    data: Path, tmp_path: Path
+) -> None:
+    plan = tiny_plan(data)
+    first = run_study(plan, tmp_path / "study", workers=0)
+    before = read_study(tmp_path / "study")
+    again = run_study(plan, tmp_path / "study", workers=0)
+    assert (first.n_ok, first.n_kept, again.n_ok, again.n_kept) == (12, 0, 0, 12)
+    other = run_study(plan, tmp_path / "other", workers=0, cache=tmp_path / "study" / "cache")
+    assert (other.n_ok, other.n_described) == (12, 0)
+    assert hashes(read_study(tmp_path / "other")) == hashes(before)
+    # From ready matrices t_e is the one that was measured.
+    assert {record.encode_s for record in before} == {
+        record.encode_s for record in read_study(tmp_path / "other")
+    }
+
+
+def test_every_picture_is_described_once_for_all_pairs(data: Path, tmp_path: Path) -> None:
+    plan = tiny_plan(data, compression='{ levels = [0, 50, 99], pairs = ["grid"] }')
+    result = run_study(plan, tmp_path / "study", workers=0)
+    assert result.n_runs == 27
+    assert result.n_described == 2 * 3 * 40
+
+
+def test_a_plan_edited_keeps_what_it_still_asks_for(data: Path, tmp_path: Path) -> None:
+    study = tmp_path / "study"
+    run_study(tiny_plan(data, sequence_lengths="[1, 2]"), study, workers=0)
+    before = hashes(read_study(study))
+    result = run_study(tiny_plan(data, sequence_lengths="[2, 5]"), study, workers=0)
+    assert (result.n_kept, result.n_ok, result.n_described) == (4, 4, 0)
+    after = hashes(read_study(study))
+    assert {record.sequence_length for record in read_study(study)} == {"2", "5"}
+    assert after.items() & before.items() == {
+        (key, value) for key, value in before.items() if key in after
+    }
+    assert len(list((study / "superseded").iterdir())) > 0
+
+
+def test_two_equal_techniques_and_datasets_of_one_content(data: Path, tmp_path: Path) -> None:
+    write_dataset(data / "copy", n_frames=40)
+    plan = tiny_plan(data, datasets='["noise", "copy"]', techniques='["tiny", "tiny"]')
+    result = run_study(plan, tmp_path / "study", workers=0)
+    assert result.n_runs == result.n_ok == 24
+    assert result.n_described == 160, "equal pictures are described once"
+
+
+def test_progress_counts_to_its_total(data: Path, tmp_path: Path) -> None:
+    seen: dict[str, list[int]] = {}
+
+    def watch(items: Iterable[Any], *, total: int, label: str) -> Iterable[Any]:
+        seen[label] = [total, 0]
+        for item in items:
+            seen[label][1] += 1
+            yield item
+
+    run_study(tiny_plan(data), tmp_path / "study", workers=0, progress=watch)
+    assert any(label.startswith("study tiny study") for label in seen)
+    assert all(total == count > 0 for total, count in seen.values())
+
+
+def test_what_is_not_here_is_on_record(data: Path, tmp_path: Path) -> None:
+    plan = replace(tiny_plan(data), missing=("elsewhere",))
+    result = run_study(plan, tmp_path / "study", workers=0)
+    assert (result.n_missing, result.n_ok) == (1, 12)
+    (missing,) = [r for r in read_study(tmp_path / "study") if r.status == "missing"]
+    assert (missing.dataset, missing.error) == ("elsewhere", "dataset elsewhere: not here")
+
+
+def test_seeds_move_intervals_only(data: Path, tmp_path: Path) -> None:
+    changes = {"seeds": "[1, 2]", "sequence_lengths": "[1]", "compression": "{ levels = [99] }"}
+    plan = tiny_plan(data, techniques='[{ name = "tiny", parameters = { side = 2 } }]', **changes)
+    run_study(plan, tmp_path / "study", workers=0)
+    one, two = read_study(tmp_path / "study")
+    assert one.answer_reference == two.answer_reference
+    assert 0 < one.accuracy < 1, "else the intervals have nothing to differ in"
+
+
+def test_one_study_at_a_time_in_a_folder(data: Path, tmp_path: Path) -> None:
+    from retraverse.studies.study_folder import StudyFolder
+
+    with (
+        StudyFolder.opened(tmp_path / "study"),
+        pytest.raises(InputError, match="another process is running it"),
+    ):
+        run_study(tiny_plan(data), tmp_path / "study", workers=0)
+
+
+def test_wrong_calls(data: Path, tmp_path: Path) -> None:
+    plan = tiny_plan(data)
+    with pytest.raises(InputError, match="workers: got -1"):
+        run_study(plan, tmp_path / "study", workers=-1)
+    with pytest.raises(PlanError, match="has only 40 frames"):
+        run_study(replace(plan, sequence_lengths=(41,)), tmp_path / "study")
+    with pytest.raises(InputError, match="expected tcp://HOST:PORT"):
+        run_study(plan, tmp_path / "study", cluster="http://x")
+
+
+def test_estimate_counts_what_is_left(data: Path, tmp_path: Path) -> None:
+    plan = tiny_plan(data)
+    before = estimate_study(plan, tmp_path / "study")
+    assert (before.n_runs, before.n_pictures, before.problems) == (12, 160, ())
+    assert before.seconds > 0
+    assert not (tmp_path / "study").exists(), "an estimate writes nothing"
+    run_study(plan, tmp_path / "study", workers=0)
+    size = sum(path.stat().st_size for path in (tmp_path / "study").rglob("*") if path.is_file())
+    assert before.n_bytes / 3 < size < 3 * before.n_bytes
+    assert estimate_study(plan, tmp_path / "study").n_pictures == 0
+
+
+def test_estimate_tells_what_fails(data: Path, tmp_path: Path) -> None:
+    write_dataset(data / "bad", n_frames=4, marked=0)
+    plan = tiny_plan(
+        data,
+        datasets='["bad"]',
+        techniques='[{ name = "tiny", parameters = { trouble = "raise" } }]',
+        compression='{ levels = ["none"] }',
+    )
+    (problem,) = estimate_study(plan, tmp_path / "study").problems
+    assert problem == "tiny on 000.png: ValueError: a picture it cannot stand"
+
+
+def test_memory_of_planning_does_not_hold_pictures(data: Path, tmp_path: Path) -> None:
+    work = plan_work(tiny_plan(data), StudyCache(tmp_path / "cache"))
+    assert all(frame.path is not None for task in work.tasks for frame in task.frames)
+    assert [len(task.frames) for task in work.tasks] == [32, 8, 32, 8]
