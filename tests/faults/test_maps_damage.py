@@ -200,7 +200,7 @@ def test_another_technique(place: Path) -> None:
         return line
 
     assert "made with fake(size=8, gain=1.0) version 2, this program has" in change("version", 2)
-    assert "this program lacks: unknown technique: got 'netvlad'" in change("name", "netvlad")
+    assert "this program lacks: unknown technique: got 'nonesuch'" in change("name", "nonesuch")
     assert "unknown parameter of fake: got 'depth'" in change("parameters", {"depth": 3})
     assert "expected int" in change("parameters", {"size": [8]})
     # Fewer parameters than there are: others would silently take their defaults.
