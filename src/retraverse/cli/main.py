@@ -11,7 +11,21 @@ import warnings
 import typer
 
 from retraverse._version import __version__
-from retraverse.cli import compare, datasets, demo, doctor, evaluate, listing, localize, maps
+from retraverse.cli import (
+    compare,
+    datasets,
+    demo,
+    doctor,
+    evaluate,
+    listing,
+    localize,
+    maps,
+    reproduce,
+    study,
+    train,
+    view,
+    weights,
+)
 from retraverse.errors import RetraverseError
 
 __all__ = ["VERBS", "app", "run"]
@@ -27,6 +41,21 @@ VERBS = (
     "techniques",
     "matchers",
     "datasets simulate",
+    "weights list",
+    "weights get",
+    "weights import",
+    "weights verify",
+    "train jpeg-distil",
+    "train jpeg-labels",
+    "train calc",
+    "train deepseqslam",
+    "train netvlad",
+    "study check",
+    "study run",
+    "study show",
+    "study report",
+    "reproduce",
+    "view",
     "doctor",
 )
 """Every verb, in the order a newcomer meets them."""
@@ -47,6 +76,11 @@ app.command("evaluate")(evaluate.evaluate)
 app.command("techniques")(listing.techniques)
 app.command("matchers")(listing.matchers)
 app.add_typer(datasets.app, name="datasets")
+app.add_typer(weights.app, name="weights")
+app.add_typer(train.app, name="train")
+app.add_typer(study.app, name="study")
+app.command("reproduce")(reproduce.reproduce)
+app.command("view")(view.view)
 app.command("doctor")(doctor.doctor)
 
 

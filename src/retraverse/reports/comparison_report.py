@@ -4,16 +4,11 @@ The page opens from disk: style, script, figures and pictures are inside, and it
 policy forbids it to ask the network for anything. It draws from the record only.
 """
 
-import base64
-import hashlib
 import os
-from importlib import resources
 from pathlib import Path
-from typing import Any
 
 from retraverse.errors import InputError, ShapeError
 from retraverse.files import write_whole
-from retraverse.reports import wording
 from retraverse.reports.curve_figures import (
     accuracy_by_length,
     length_histogram,
@@ -22,6 +17,7 @@ from retraverse.reports.curve_figures import (
 )
 from retraverse.reports.matrix_figure import RAMP, matrix_figure
 from retraverse.reports.numbers import cost_numbers, key_figures, quality_numbers
+from retraverse.reports.page import render_page
 from retraverse.reports.page_data import (
     facts_text,
     is_wide,
@@ -116,8 +112,15 @@ def comparison_html(
         "key_figures": key_figures(record),
         "unreadable": [key for key, picture in book.pictures.items() if not picture.readable],
         "data": script_data(record, windows, walk, sheets, book),
+        "verdict_text": verdict_text,
+        "facts_text": facts_text,
     }
-    return _rendered(context)
+    return render_page(
+        "comparison.html.j2",
+        context,
+        styles=("comparison.css",),
+        scripts=("widgets.js", "comparison.js"),
+    )
 
 
 def _check_length(name: str, frames: Pictures, traverse: TraverseRecord) -> None:
@@ -126,28 +129,3 @@ def _check_length(name: str, frames: Pictures, traverse: TraverseRecord) -> None
             f"pictures of the {name} traverse: got {len(frames)} frames, expected the record's "
             f"{traverse.n_frames}; is it the traverse that was compared?"
         )
-
-
-def _rendered(context: dict[str, Any]) -> str:
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-    from markupsafe import Markup
-
-    environment = Environment(
-        loader=PackageLoader("retraverse.reports"),
-        autoescape=True,
-        undefined=StrictUndefined,
-    )
-    environment.globals.update(wording=wording, verdict_text=verdict_text, facts_text=facts_text)
-    environment.filters["subscripts"] = wording.subscripts
-    script = _resource("comparison.js")
-    page = environment.get_template("comparison.html.j2").render(
-        **context,
-        style=Markup(_resource("comparison.css")),
-        script=Markup(script),
-        script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
-    )
-    return page.lstrip()
-
-
-def _resource(name: str) -> str:
-    return (resources.files("retraverse.reports") / "templates" / name).read_text("utf-8")

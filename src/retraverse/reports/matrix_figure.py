@@ -1,5 +1,6 @@
 """The similarity matrix with the matched path and the true band over it."""
 
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -15,7 +16,7 @@ from retraverse.types import Array, BoolArray, FloatArray
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["RAMP", "MatrixFigure", "matrix_figure"]
+__all__ = ["RAMP", "MatrixFigure", "MatrixPicture", "matrix_figure", "matrix_picture"]
 
 RAMP = ("#10151c", "#3b4754", "#7f8b97", "#c5ccd3", "#ffffff")
 """Colours of low to high scores: dark to light, so that coloured marks stand out on all of it."""
@@ -72,9 +73,46 @@ def _alt(record: ComparisonRecord, windows: Sequence[Window]) -> str:
     )
 
 
-def _averaged(matrix: FloatArray) -> tuple[FloatArray, tuple[int, int]]:
-    """Return the matrix as means over blocks of at most `_MAX_CELLS` a side, and the block."""
-    block = (-(-matrix.shape[0] // _MAX_CELLS), -(-matrix.shape[1] // _MAX_CELLS))
+@dataclass(frozen=True)
+class MatrixPicture:
+    """The cells of a matrix alone, for pages that lay the answers over it themselves."""
+
+    png: bytes
+    shape: tuple[int, int]
+    """Query and reference frames of the whole matrix."""
+    low: float
+    high: float
+    block: tuple[int, int]
+    """As in `MatrixFigure`."""
+
+
+def matrix_picture(similarity: FloatArray, *, longest: int = 256) -> MatrixPicture:
+    """Draw the scores in the colours of `matrix_figure`, at most `longest` cells a side."""
+    from PIL import Image
+
+    cells, block = _averaged(similarity, longest)
+    low, high = _limits(cells)
+    levels = _LEVELS // 2
+    shares = np.nan_to_num((cells - low) / (high - low), nan=0.0, posinf=1.0, neginf=0.0)
+    image = Image.fromarray((np.clip(shares, 0, 1) * (levels - 1)).round().astype(np.uint8), "P")
+    image.putpalette(_ramp_colours(levels))
+    buffer = io.BytesIO()
+    image.save(buffer, "PNG", optimize=True)
+    shape = similarity.shape[0], similarity.shape[1]
+    return MatrixPicture(buffer.getvalue(), shape, low, high, block)
+
+
+def _ramp_colours(levels: int) -> bytes:
+    """Return `levels` colours along the ramp, 3 bytes each."""
+    stops = np.array([[int(colour[at : at + 2], 16) for at in (1, 3, 5)] for colour in RAMP])
+    at = np.linspace(0, len(RAMP) - 1, levels)
+    mixed = [np.interp(at, np.arange(len(RAMP)), channel) for channel in stops.T]
+    return np.stack(mixed, axis=1).round().astype(np.uint8).tobytes()
+
+
+def _averaged(matrix: FloatArray, longest: int = _MAX_CELLS) -> tuple[FloatArray, tuple[int, int]]:
+    """Return the matrix as means over blocks, at most `longest` of them a side, and the block."""
+    block = (-(-matrix.shape[0] // longest), -(-matrix.shape[1] // longest))
     if block == (1, 1):
         return matrix, block
     return _block_sums(matrix, block) / _block_sums(np.ones_like(matrix), block), block

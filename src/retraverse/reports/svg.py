@@ -19,7 +19,16 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["COLOURS", "MANY_POINTS", "Plot", "Span", "drawing", "export", "panel"]
+__all__ = [
+    "COLOURS",
+    "MANY_POINTS",
+    "Plot",
+    "Span",
+    "drawing",
+    "export",
+    "panel",
+    "standalone",
+]
 
 COLOURS = {
     "ink": "#1b2431",
@@ -29,6 +38,13 @@ COLOURS = {
     "correct": "#0072b3",
     "wrong": "#d55e01",
     "truth": "#009e74",
+    "series-0": "#0072b4",
+    "series-1": "#d55e02",
+    "series-2": "#009e75",
+    "series-3": "#cc79a6",
+    "series-4": "#b77d01",
+    "series-5": "#56b4e8",
+    "series-6": "#4d5866",
 }
 """CSS variable -> the value drawn in its place; safe for the usual colour blindnesses."""
 
@@ -122,6 +138,13 @@ def export(figure: "Figure", axes: "Axes", alt: str) -> Plot:
     nothing = {"Date": None, "Creator": None, "Format": None, "Type": None}
     figure.savefig(buffer, format="svg", metadata=nothing, dpi=144)
     return Plot(Markup(_inline(buffer.getvalue(), alt)), alt, _span(axes))
+
+
+def standalone(plot: Plot) -> str:
+    """Return a figure as the text of an SVG file of its own, in the light page's colours."""
+    text = re.sub(r"var\(--([a-z0-9-]+)\)", lambda found: COLOURS[found[1]], str(plot.svg))
+    head = '<?xml version="1.0" encoding="utf-8"?>\n<svg xmlns="http://www.w3.org/2000/svg" '
+    return text.replace("<svg ", head, 1) + "\n"
 
 
 def _span(axes: "Axes") -> Span:

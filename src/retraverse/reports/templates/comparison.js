@@ -1,27 +1,6 @@
-"use strict";
 (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
-  const one = (selector, inside = document) => inside.querySelector(selector);
-  const all = (selector, inside = document) => [...inside.querySelectorAll(selector)];
-  document.documentElement.classList.add("js");
-
-  // Fractions of a plot for a data value, and back.
-  const spanOf = (plot) => JSON.parse(plot.dataset.span);
-  const place = (range, value) => (value - range[0]) / (range[1] - range[0]);
-  const value = (range, fraction) => range[0] + fraction * (range[1] - range[0]);
-
-  const addCursor = (plot, className) => {
-    const cursor = document.createElement("div");
-    cursor.className = "cursor " + className;
-    cursor.setAttribute("aria-hidden", "true");
-    plot.append(cursor);
-    return cursor;
-  };
-  const setBox = (cursor, box) => {
-    for (const [side, fraction] of Object.entries(box)) {
-      cursor.style[side] = typeof fraction === "number" ? 100 * fraction + "%" : fraction;
-    }
-  };
+  const { one, all, spanOf, place, value, addCursor, setBox, framesAt, makeWalk } = widgets;
 
   const matrix = one('[data-plot="matrix"]');
   const matrixSpan = spanOf(matrix);
@@ -40,40 +19,13 @@
 
   // The walk along the route.
   const walk = document.getElementById("walk");
-  const slider = one('[data-walk="slider"]');
   const pictureOf = (key) =>
     data.pictures[key] || one(`.case img[data-picture="${key}"]`)?.getAttribute("src");
 
-  const fill = (slot, role, frame, absent) => {
-    const figure = one(".picture." + slot, walk);
-    if (!figure) return;
-    const shown = document.createElement(frame ? "img" : "div");
-    if (frame) {
-      shown.src = pictureOf(frame.key);
-      shown.alt = `${role} frame ${frame.number}, ${frame.name}`;
-    } else {
-      shown.className = "absent";
-      shown.textContent = absent;
-    }
-    figure.firstElementChild.replaceWith(shown);
-    one(".number", figure).textContent = frame ? `frame ${frame.number}` : "";
-    one(".name", figure).textContent = frame ? frame.name : "";
-  };
-
-  const show = (at) => {
-    const step = data.steps[at];
-    if (!step) return;
-    slider.value = at;
-    slider.setAttribute("aria-valuetext", `query frame ${step.query}, ${step.verdictText}`);
-    const verdict = one('[data-walk="verdict"]');
-    verdict.textContent = step.verdictText;
-    verdict.className = "verdict " + step.verdict;
-    one('[data-walk="facts"]').textContent = step.factsText;
-    fill("query", "Query", step.frames.query, "");
-    fill("matched", "Matched", step.frames.matched, "no match");
-    fill("true", "True", step.frames.true, "not in the map");
-    showPlace(step.query);
-  };
+  const step = (at) => data.steps[at];
+  const { show } = walk
+    ? makeWalk(walk, { step, pictureOf, onShow: (shown) => showPlace(shown.query) })
+    : { show: () => {} };
   const showNearest = (query) => {
     let best = 0;
     data.steps.forEach((step, at) => {
@@ -81,12 +33,7 @@
     });
     show(best);
   };
-  if (walk) {
-    slider.addEventListener("input", () => show(Number(slider.value)));
-    one('[data-walk="previous"]').addEventListener("click", () => show(Number(slider.value) - 1));
-    one('[data-walk="next"]').addEventListener("click", () => show(Number(slider.value) + 1));
-    show(Number(slider.value));
-  }
+  if (walk) show(Number(one('[data-walk="slider"]').value));
 
   // Reading the matrix under the pointer.
   const readout = one("[data-readout]");
@@ -100,15 +47,8 @@
       return data.scores.low + (bytes[at] + 256 * bytes[at + 1]) * step;
     };
   })();
-  const frameAt = (event) => {
-    const box = matrix.getBoundingClientRect();
-    const x = ((event.clientX - box.left) / box.width - matrixSpan.left) / matrixSpan.width;
-    const y = ((event.clientY - box.top) / box.height - matrixSpan.top) / matrixSpan.height;
-    if (x < 0 || x >= 1 || y < 0 || y >= 1) return null;
-    return [Math.round(value(matrixSpan.y, y)), Math.round(value(matrixSpan.x, x))];
-  };
   matrix.addEventListener("pointermove", (event) => {
-    const pair = frameAt(event);
+    const pair = framesAt(matrix, matrixSpan, event);
     if (!pair) return;
     const score = scoreAt(...pair);
     readout.textContent =
@@ -116,7 +56,7 @@
     readout.title = data.names ? `${data.names.q[pair[0]]} and ${data.names.r[pair[1]]}` : "";
   });
   matrix.addEventListener("click", (event) => {
-    const pair = frameAt(event);
+    const pair = framesAt(matrix, matrixSpan, event);
     if (pair && walk) showNearest(pair[0]);
   });
   for (const box of all("[data-layer]")) {
