@@ -186,13 +186,13 @@ def test_points_are_reached_by_keyboard(open_page: Opener, report: Path) -> None
     plot.focus()
     readout = page.locator(".panel output").first
     page.keyboard.press("ArrowRight")
-    assert readout.inner_text().startswith("hog: Sequence length K 1")
+    assert readout.inner_text().startswith("cohog: Sequence length K 1")
     page.keyboard.press("ArrowRight")
-    assert readout.inner_text().startswith("hog: Sequence length K 2")
-    page.keyboard.press("ArrowDown")
     assert readout.inner_text().startswith("cohog: Sequence length K 2")
+    page.keyboard.press("ArrowDown")
+    assert readout.inner_text().startswith("hog: Sequence length K 2")
     page.keyboard.press("Enter")
-    page.locator("#run h2", has_text="cohog on Corridor").wait_for()
+    page.locator("#run h2", has_text="hog on Corridor").wait_for()
     assert opened.is_quiet()
 
 
@@ -200,7 +200,7 @@ def test_matches_are_stepped_through_by_mouse_and_keyboard(open_page: Opener, re
     opened = open_page((report / "chapter-4.html").as_uri(), 400)
     page = opened.page
     page.locator(".plot.points").first.focus()
-    for key in ("ArrowRight", "Enter"):  # hog at K = 1, which has wrong answers
+    for key in ("ArrowRight", "Enter"):  # cohog at K = 1, which has wrong answers
         page.keyboard.press(key)
     dialog = page.locator("#run")
     picture = dialog.locator(".picture.query img")

@@ -57,9 +57,7 @@ def chapter_plans(
             "with two drives in it"
         )
     return tuple(
-        read_plan(
-            _with_datasets(text, names), source=source, data=Path(data), on_missing="record"
-        )
+        read_plan(_with_datasets(text, names), source=source, data=Path(data), on_missing="record")
         for source, text in _plan_texts()
         if tomllib.loads(text)["chapter"] in chapters
     )

@@ -14,6 +14,7 @@ from retraverse.studies.records import RunRecord
 
 __all__ = [
     "Artefact",
+    "Case",
     "Cell",
     "Chapter",
     "Figure",
@@ -21,6 +22,7 @@ __all__ = [
     "Panel",
     "Row",
     "Section",
+    "Sheet",
     "Table",
     "slug",
 ]
@@ -131,7 +133,30 @@ class Figure:
         return tuple(sorted(found, key=lambda series: series.index))
 
 
-Artefact = Table | Figure
+@dataclass(frozen=True)
+class Case:
+    """One window in pictures: some of its frames over the map frames they were matched with."""
+
+    is_correct: bool
+    text: str
+    """Where it is, and how sure."""
+    run: RunRecord
+    pairs: tuple[tuple[tuple[str, str], tuple[str, str]], ...]
+    """(query, map) of each frame shown: address and description of the picture."""
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """Right and wrong matches in pictures."""
+
+    number: str
+    title: str
+    cases: tuple[Case, ...]
+    caption: str = ""
+    definitions: tuple[tuple[str, str], ...] = ()
+
+
+Artefact = Table | Figure | Sheet
 
 
 @dataclass(frozen=True)

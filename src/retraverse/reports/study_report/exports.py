@@ -71,7 +71,7 @@ def write_exports(chapter: Chapter, out: Path) -> dict[str, tuple[Export, ...]]:
     folder = out / "exports" / chapter.key
     exports = {}
     for key, artefact in zip(artefact_keys(chapter), chapter.artefacts, strict=True):
-        files = _table_files(artefact) if isinstance(artefact, Table) else _figure_files(artefact)
+        files = _files(artefact)
         links = []
         for name, ending, text in files:
             file = f"{key}{ending}"
@@ -79,6 +79,13 @@ def write_exports(chapter: Chapter, out: Path) -> dict[str, tuple[Export, ...]]:
             links.append(Export(name, f"exports/{chapter.key}/{file}"))
         exports[key] = tuple(links)
     return exports
+
+
+def _files(artefact: Artefact) -> list[tuple[str, str, str]]:
+    """Return (name, ending, text) of an artefact's files; pictures are files already."""
+    if isinstance(artefact, Table):
+        return _table_files(artefact)
+    return _figure_files(artefact) if isinstance(artefact, Figure) else []
 
 
 def _table_files(table: Table) -> list[tuple[str, str, str]]:

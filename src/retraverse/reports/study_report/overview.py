@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from retraverse.reports.study_report.artefacts import Cell, Row, Table
 from retraverse.reports.study_report.words import (
+    dataset_order,
     dataset_title,
     meanings,
     place_text,
@@ -37,7 +38,9 @@ def best_table(records: Sequence[RunRecord]) -> Table:
     """Return, for every dataset, the runs to begin a choice with."""
     curves = list(curves_of(records).values())
     rows = []
-    for dataset in dict.fromkeys(run.dataset for run in records if run.status == "ok"):
+    for dataset in sorted(
+        {run.dataset for run in records if run.status == "ok"}, key=dataset_order
+    ):
         here = [curve for curve in curves if curve[0].dataset == dataset]
         full = [s.first for curve in here if (s := smallest_length(curve)) is not None]
         singles = [curve[0] for curve in here if curve[0].sequence_length == "1"]
@@ -67,7 +70,7 @@ def best_table(records: Sequence[RunRecord]) -> Table:
             "100 % in the least time",
         ),
         tuple(rows),
-        "A click opens the run. Fewer than some twenty candidates left make 100 % easy: see the "
+        "Each is the best of all runs of the study, which flatters it. A click opens the run. Fewer than some twenty candidates left make 100 % easy: see the "
         "chapters' tables.",
         meanings("accuracy", "smallest K", "d", "t_VPR"),
     )
@@ -95,7 +98,7 @@ def _mix(run: RunRecord) -> str:
 def datasets_table(records: Sequence[RunRecord], absent: Iterable[str]) -> Table:
     """Return what every dataset is and how its answers were judged."""
     rows = []
-    for dataset in dict.fromkeys(run.dataset for run in records):
+    for dataset in sorted({run.dataset for run in records}, key=dataset_order):
         runs = [run for run in records if run.dataset == dataset and run.status == "ok"]
         if runs:
             first = runs[0]

@@ -5,12 +5,16 @@ finds it again by the panel's span and the values it carries.
 """
 
 import math
+import re
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
+
+from markupsafe import Markup
 
 from retraverse.reports.study_report.artefacts import Line, Panel, slug
 from retraverse.reports.study_report.series import Series
-from retraverse.reports.svg import COLOURS, drawing, export, panel
+from retraverse.reports.svg import COLOURS, Plot, drawing, export, panel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -53,11 +57,11 @@ def draw_lines(
     with drawing(f"lines-{slug(name)}-{slug(title)}"):
         figure, axes = panel(*_SIZE, left=56)
         for line in shown:
-            _draw_line(axes, line, is_joined=is_joined)
+            _draw_line(axes, line, is_joined=is_joined, has_steps=bool(x_ticks))
         axes.set(xlabel=x_label, ylabel=y_label)
         axes.grid(axis="both" if not is_joined else "y")
         _set_scales(axes, shown, x_ticks, is_log, y_limits)
-        plot = export(figure, axes, _alt(title, shown, x_label, y_label, x_ticks))
+        plot = _indexed(export(figure, axes, _alt(title, shown, x_label, y_label, x_ticks)))
     return Panel(title, note, plot, tuple(shown), x_label, y_label, tuple(x_ticks), is_log)
 
 
@@ -96,7 +100,7 @@ def draw_dots(
             axes.set_xlim(-2, 103)
         elif rows:
             axes.set_xlim(0, 1.06 * max(line.x[0] for line in rows) or 1)
-        plot = export(figure, axes, _dots_alt(title, rows, x_label))
+        plot = _indexed(export(figure, axes, _dots_alt(title, rows, x_label)))
     return Panel(title, note, plot, tuple(rows), x_label, "", (), (is_log, False))
 
 
@@ -118,6 +122,13 @@ def draw_bars(
         )
         plot = export(figure, axes, alt)
     return Panel(title, note, plot, (line,), x_label, y_label)
+
+
+def _indexed(plot: Plot) -> Plot:
+    """Return a drawing in whose labels the field's indices are set as such: t_VPR, P_R100."""
+    low = r'\1<tspan dy="2.5" style="font-size: .75em">\2</tspan><tspan dy="-2.5">\3</tspan></text>'
+    svg = re.sub(r"\b([tPR])_([A-Za-z0-9]+)([^<]*)</text>", low, str(plot.svg))
+    return replace(plot, svg=Markup(svg))
 
 
 def _finite(line: Line, is_log: tuple[bool, bool]) -> Line:
@@ -149,13 +160,27 @@ def _mark(series: Series, size: float) -> dict[str, Any]:
     }
 
 
-def _draw_line(axes: "Axes", line: Line, *, is_joined: bool) -> None:
+def _with_gaps(line: Line) -> tuple[list[float], list[float]]:
+    """Return a line along steps with a break where steps are missing: nothing was found there."""
+    x: list[float] = []
+    y: list[float] = []
+    for at, value in zip(line.x, line.y, strict=True):
+        if x and at - x[-1] > 1:
+            x.append(x[-1] + 1)
+            y.append(math.nan)
+        x.append(at)
+        y.append(value)
+    return x, y
+
+
+def _draw_line(axes: "Axes", line: Line, *, is_joined: bool, has_steps: bool) -> None:
     style = _mark(line.series, 6.5)
     if is_joined and len(line.x) > _MARKED_POINTS:
         style |= {"markevery": max(1, len(line.x) // 8), "ms": 5.5}
     width = 1.7 if is_joined else 0.0
     dashes: Any = (4, 2) if mark_of(line.series)[2] else (None, None)
-    axes.plot(line.x, line.y, lw=width, dashes=dashes, zorder=3, **style)
+    x, y = _with_gaps(line) if has_steps else (line.x, line.y)
+    axes.plot(x, y, lw=width, dashes=dashes, zorder=3, **style)
     if line.low and len(line.x) <= _MARKED_POINTS and is_joined:
         axes.fill_between(
             line.x,
@@ -194,6 +219,8 @@ def _set_scales(
         _plain_powers(axes.xaxis)
     elif all(float(x).is_integer() for line in lines for x in line.x):
         _whole_numbers(axes.xaxis)
+    if lines and all(float(y).is_integer() for line in lines for y in line.y):
+        _whole_numbers(axes.yaxis)
     if is_log[1]:
         axes.set_yscale("log")
         _plain_powers(axes.yaxis)

@@ -10,7 +10,14 @@ from retraverse._version import __version__
 from retraverse.errors import InputError
 from retraverse.reports.matrix_figure import RAMP
 from retraverse.reports.page import render_page
-from retraverse.reports.study_report.artefacts import Artefact, Chapter, Figure, Table, slug
+from retraverse.reports.study_report.artefacts import (
+    Artefact,
+    Chapter,
+    Figure,
+    Sheet,
+    Table,
+    slug,
+)
 from retraverse.reports.study_report.chapters import CHAPTERS, ChapterInput
 from retraverse.reports.study_report.exports import artefact_keys, write_exports
 from retraverse.reports.study_report.overview import (
@@ -106,12 +113,15 @@ def write_study_report(
         return with_long_columns(studies, runs)
 
     caches = [Path(cache)] if cache is not None else [study / "cache" for study in studies]
-    files = RunFiles(out, caches, PictureFiles(out, pictures), in_full)
+    thumbnails = PictureFiles(out, pictures)
+    files = RunFiles(out, caches, thumbnails, in_full)
     files.write(records, progress)
     made = []
     by_page = _by_page(records)
     for key in progress(list(by_page), total=len(by_page), label="pages of the report"):
-        given = ChapterInput(key, tuple(by_page[key]), in_full, SeriesBook({}), published)
+        given = ChapterInput(
+            key, tuple(by_page[key]), in_full, SeriesBook({}), published, thumbnails
+        )
         made.append(_finished(CHAPTERS[key](given), given))
     links = [(page_name(chapter.key), page_title(chapter)) for chapter in made]
     name = _study_name(records, Path(study_folder))
@@ -154,7 +164,9 @@ def _finished(chapter: Chapter, given: ChapterInput) -> Chapter:
 
 
 def _is_empty(artefact: Artefact) -> bool:
-    return not (artefact.panels if isinstance(artefact, Figure) else artefact.rows)
+    if isinstance(artefact, Figure):
+        return not artefact.panels
+    return not (artefact.rows if isinstance(artefact, Table) else artefact.cases)
 
 
 @dataclass(frozen=True)
@@ -164,7 +176,8 @@ class _Shown:
     key: str
     item: Artefact
     exports: Sequence[Any]
-    is_table: bool
+    kind: str
+    """``"table"``, ``"figure"``, ``"sheet"``."""
 
 
 def _write_chapter(
@@ -174,7 +187,7 @@ def _write_chapter(
     keys = artefact_keys(chapter)
     exports = write_exports(chapter, out)
     shown = {
-        id(item): _Shown(key, item, exports[key], isinstance(item, Table))
+        id(item): _Shown(key, item, exports[key], type(item).__name__.lower())
         for key, item in zip(keys, chapter.artefacts, strict=True)
     }
     techniques = sorted({run.technique for run in chapter.records if run.status == "ok"})
@@ -185,6 +198,9 @@ def _write_chapter(
                 for cell in row.cells:
                     if cell.run is not None:
                         links.link(cell.run)
+        if isinstance(item, Sheet):
+            for case in item.cases:
+                links.link(case.run)
     points = chapter_points(chapter, keys, links)
     _render(
         out / page_name(chapter.key),

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from retraverse.reports.study_report.words import dataset_order
 from retraverse.studies.records import RunRecord
 from retraverse.studies.selection import condition_of
 
@@ -86,6 +87,8 @@ class Runs:
         self._usual_resizer = _commonest(record.resizer for record in self.records)
         keys = [self._key(record, over_length) for record in self.records]
         names = _names(sorted(set(keys)))
+        for key in sorted(names):
+            book.get(names[key], key.technique)
         found: dict[tuple[Series, str, Place], list[RunRecord]] = {}
         for record, key in zip(self.records, keys, strict=True):
             series = book.get(names[key], record.technique)
@@ -93,7 +96,7 @@ class Runs:
             found.setdefault((series, record.dataset, place), []).append(record)
         self._found = {group: _by_length(runs) for group, runs in found.items()}
         self.series = sorted({group[0] for group in found})
-        self.datasets = list(dict.fromkeys(record.dataset for record in self.records))
+        self.datasets = sorted({record.dataset for record in self.records}, key=dataset_order)
         self.places = sorted({group[2] for group in found})
 
     @property

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 
-from retraverse.datasets.known import known_dataset
+from retraverse.datasets.known import known_dataset, known_datasets
 from retraverse.metrics import DEFINITIONS
 from retraverse.reports.wording import NARROW, NOTHING, count, percent, plain, ratio, seconds
 from retraverse.studies.records import RunRecord
@@ -11,6 +11,7 @@ from retraverse.studies.records import RunRecord
 __all__ = [
     "MEANINGS",
     "compression_text",
+    "dataset_order",
     "dataset_title",
     "length_words",
     "meanings",
@@ -62,6 +63,12 @@ MEANINGS: Mapping[str, str] = {
 def meanings(*names: str) -> tuple[tuple[str, str], ...]:
     """Return (name, definition) pairs."""
     return tuple((name, MEANINGS[name]) for name in names)
+
+
+def dataset_order(name: str) -> tuple[int, str]:
+    """Return what datasets are sorted by: those known by name first, in their own order."""
+    names = [known.name for known in known_datasets()]
+    return (names.index(name) if name in names else len(names), name)
 
 
 def dataset_title(name: str) -> str:

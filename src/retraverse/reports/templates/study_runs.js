@@ -266,6 +266,9 @@
     const cut = link.indexOf("/");
     widgets.openRun(Number(link.slice(0, cut)), link.slice(cut + 1));
   };
+  for (const button of all(".match-case .open-run")) {
+    button.addEventListener("click", () => openLink(button.dataset.run));
+  }
   for (const row of all("table.sortable tbody tr")) {
     row.addEventListener("click", (event) => {
       const button = event.target.closest(".open-run") || one(".open-run", row);

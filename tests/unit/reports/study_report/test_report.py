@@ -204,6 +204,20 @@ def test_matches_are_shown_in_pictures_where_they_are_at_hand(tmp_path: Path) ->
     assert np.abs(good - bad).mean() > 2  # at the compression used
 
 
+def test_sheets_show_right_and_wrong_sequences(tmp_path: Path) -> None:
+    runs = [make_run(chapter="4", length=k) for k in ("1", "5")]
+    write_study(tmp_path, runs)
+    drives = {"corridor": MadeUpDrives(ROUTES["corridor"])}
+    out = write_study_report(tmp_path, tmp_path / "out", pictures=drives.get).parent
+    page = Page((out / "chapter-4.html").read_text())
+    pictures = page.all("img")
+    assert len(pictures) == 2 * 3 * 2 * 4  # right and wrong, cases, query and map, frames
+    assert all((out / (picture["src"] or "")).is_file() for picture in pictures)
+    assert pictures[0]["alt"] == "Query frame " + re.findall(r"query (\d+) → map", page.text)[0]
+    assert "Figures 4.5, 4.6" in page.text
+    assert (page.text.count(" correct query"), page.text.count(" wrong query")) == (3, 3)
+
+
 def shade(path: Path) -> np.ndarray:
     import cv2
 

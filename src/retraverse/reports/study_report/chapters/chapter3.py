@@ -13,6 +13,7 @@ from retraverse.reports.study_report.chapters.context import (
     long_table,
     percent_cell,
 )
+from retraverse.reports.study_report.chapters.sheets import match_sheets
 from retraverse.reports.study_report.figures import (
     accuracy_percent,
     first_run,
@@ -82,6 +83,10 @@ def chapter_3(given: ChapterInput) -> Chapter:
                 ),
             ),
             Section("What does the length do?", tuple(_length_figures(given, headlines))),
+            Section(
+                "Right and wrong, in pictures",
+                match_sheets(given, headlines.records, number="Figures 3.11, 3.12"),
+            ),
         ),
         given.records,
     )

@@ -20,6 +20,7 @@ from retraverse.reports.study_report.chapters.context import (
     seconds_cell,
     whole_cell,
 )
+from retraverse.reports.study_report.chapters.sheets import match_sheets
 from retraverse.reports.study_report.figures import (
     accuracy_percent,
     over_length,
@@ -58,9 +59,20 @@ def chapter_4(given: ChapterInput) -> Chapter:
                 tuple(_budget_tables(given, runs)),
                 "The budget is t_VPR of the technique that is most accurate at K = 1.",
             ),
+            Section(
+                "Right and wrong, in pictures",
+                match_sheets(given, _middling(runs), number="Figures 4.5, 4.6"),
+            ),
         ),
         given.records,
     )
+
+
+def _middling(runs: Runs) -> list[RunRecord]:
+    """Return the runs of some five frames: long enough to help, short enough to go wrong."""
+    lengths = {length for run in runs.records if (length := length_of(run)) is not None}
+    middle = min(lengths, key=lambda length: abs(length - 5), default=None)
+    return runs.where(lambda run: length_of(run) == middle)
 
 
 def fixed_curve(runs: Runs, series: Series, dataset: str) -> tuple[RunRecord, ...]:

@@ -145,7 +145,11 @@ def _ratio_cell(given: ChapterInput, run: RunRecord | None, step: int) -> Cell:
         return Cell(NOTHING, math.nan)
     share = mean_bytes(run) / run.descriptor_bytes
     thesis = given.published("6.1", run, str(max(step, 0)))
-    return Cell(f"{100 * share:.3g} %", share, run, f"{thesis} %" if thesis else "")
+    return Cell(_percents(100 * share), share, run, f"{thesis} %" if thesis else "")
+
+
+def _percents(value: float) -> str:
+    return f"{value:,.0f} %" if value >= 100 else f"{value:.3g} %"
 
 
 def _lengths(given: ChapterInput, runs: Runs) -> tuple[Artefact, ...]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from retraverse.datasets.known import known_dataset
 from retraverse.reports.study_report.artefacts import Cell, Row, Table
+from retraverse.reports.study_report.picture_files import PictureFiles
 from retraverse.reports.study_report.published import BY_CHAPTER, published_value
 from retraverse.reports.study_report.series import Runs, Series, SeriesBook, headline_runs
 from retraverse.reports.study_report.words import dataset_title
@@ -35,6 +36,8 @@ class ChapterInput:
     book: SeriesBook
     is_published: bool = True
     """Whether the thesis' values stand beside ours."""
+    pictures: PictureFiles | None = None
+    """Writes thumbnails, where pictures are at hand."""
 
     @property
     def over_length(self) -> Runs:
