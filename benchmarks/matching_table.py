@@ -36,6 +36,7 @@ TECHNIQUES: list[tuple[str, dict[str, Any]]] = [
     ("sad", {}),
     ("patchnorm", {}),
     ("cohog", {"precision": "int8"}),
+    ("convsequential", {"precision": "int8"}),
 ]
 ON_THE_WHOLE_LINE = ("hog", "gist", "sad", "patchnorm")
 MATCHERS = [info.name for info in rt.matchers()]
