@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from retraverse.errors import InputError, ShapeError
 from retraverse.types import FloatArray
 
-__all__ = ["RunningBalance", "balance", "standardise"]
+__all__ = ["PRIOR_FRAMES", "RunningBalance", "RunningHabit", "balance", "standardise"]
 
 FLAT = 1e-7
 """A standard deviation below this share of the values' size is rounding, not a difference."""
@@ -64,8 +64,8 @@ def balance(similarity: FloatArray) -> FloatArray:
     return balanced.astype(np.float32)
 
 
-class RunningBalance:
-    """The same frame by frame: each row is balanced by the rows up to it.
+class RunningHabit:
+    """What each reference said of the queries so far: its mean and deviation, taken out of rows.
 
     The first frames are held near their own values by a prior: `PRIOR_FRAMES` frames' worth of
     mean 0 and standard deviation 1 for every reference.
@@ -76,9 +76,37 @@ class RunningBalance:
     """
 
     def __init__(self, n_references: int) -> None:
-        self._n_seen = 0
+        self._n_frames = PRIOR_FRAMES
         self._sums: Float64Array = np.zeros(n_references)
-        self._squares: Float64Array = np.zeros(n_references)
+        # At least PRIOR_FRAMES, so that no variance is 0.
+        self._squares: Float64Array = np.full(n_references, float(PRIOR_FRAMES))
+
+    def take_out(self, row: NDArray[np.floating]) -> Float64Array:
+        """Return a row of mean 0 and deviation 1 without the habits, its own part included."""
+        self._n_frames += 1
+        self._sums += row
+        self._squares += np.square(row, dtype=np.float64)
+        mean = self._sums / self._n_frames
+        variance = self._squares / self._n_frames
+        variance -= np.square(mean)
+        balanced: Float64Array = row - mean
+        balanced /= np.sqrt(variance, out=variance)
+        return balanced
+
+
+class RunningBalance:
+    """`balance` frame by frame: each row is balanced by the rows up to it.
+
+    See `RunningHabit` for the first frames.
+
+    Parameters
+    ----------
+    n_references : int
+    """
+
+    def __init__(self, n_references: int) -> None:
+        self._n_references = n_references
+        self._habit = RunningHabit(n_references)
 
     def update(self, row: FloatArray) -> FloatArray:
         """Return one query's balanced similarities, float32 (R,).
@@ -93,18 +121,10 @@ class RunningBalance:
         ShapeError
             If it is of another length, or holds NaN or infinity.
         """
-        if np.shape(row) != self._sums.shape:
-            raise ShapeError(f"row: got shape {np.shape(row)}, expected {self._sums.shape}")
+        if np.shape(row) != (self._n_references,):
+            raise ShapeError(f"row: got shape {np.shape(row)}, expected ({self._n_references},)")
         standard = standardise(_checked(np.asarray(row)[np.newaxis]), axis=1)[0]
-        self._n_seen += 1
-        self._sums += standard
-        self._squares += standard**2
-        weight = self._n_seen + PRIOR_FRAMES
-        mean = self._sums / weight
-        # At least PRIOR_FRAMES / weight, so never 0.
-        variance = (self._squares + PRIOR_FRAMES) / weight - mean**2
-        balanced: FloatArray = ((standard - mean) / np.sqrt(variance)).astype(np.float32)
-        return balanced
+        return self._habit.take_out(standard).astype(np.float32)
 
 
 def standardise(values: Float64Array, axis: int) -> Float64Array:

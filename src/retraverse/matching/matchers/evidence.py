@@ -19,7 +19,7 @@ from typing import Literal
 
 import numpy as np
 
-from retraverse.matching.balance import PRIOR_FRAMES, RunningBalance
+from retraverse.matching.balance import PRIOR_FRAMES, RunningHabit
 from retraverse.matching.checks import check_row
 from retraverse.types import Array, BoolArray, FloatArray, IntArray
 
@@ -83,16 +83,18 @@ class RunningEvidence:
 
     def __init__(self, n_references: int, kind: EvidenceKind) -> None:
         self._n_references = n_references
-        self._balance = RunningBalance(n_references) if kind == "balanced" else None
+        self._habit = RunningHabit(n_references) if kind == "balanced" else None
 
     def update(self, row: FloatArray) -> FloatArray:
         """Return the next frame's evidence, float32 (1, R); ShapeError for an unfit row."""
         checked = check_row(row, self._n_references)
-        if self._balance is None:
-            return drive_evidence(checked, "row")
-        informed = drive_evidence(checked, "row").any()
-        balanced = self._balance.update(checked[0])[np.newaxis]
-        return drive_evidence(balanced if informed else np.zeros_like(balanced), "row")
+        evidence = _standardise_rows(checked, out=np.empty(checked.shape, np.float32))
+        if self._habit is not None:
+            says_something = evidence.any()
+            evidence[0] = self._habit.take_out(evidence[0])
+            evidence *= says_something
+            _standardise_rows(evidence, out=evidence)
+        return np.asarray(np.clip(evidence, -LARGEST, LARGEST, out=evidence))
 
 
 def no_information(evidence: FloatArray) -> bool:
