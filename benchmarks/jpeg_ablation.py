@@ -28,6 +28,12 @@ Points = dict[tuple[str, int, str, str], AblationPoint]
 
 def main() -> None:
     c = int(sys.argv[2]) if len(sys.argv) > 2 else 97
+    print(f"c = {c}\n")
+    print_head("part", "what is done")
+    for part in JPEG_PARTS:
+        print_row(part.name, part.summary)
+    print()
+    print_head("set", "K", "part", *NAMES)
     points: Points = {}
     titles = []
     techniques = {name: rt.technique(TECHNIQUES[name][0], **TECHNIQUES[name][1]) for name in NAMES}
@@ -44,15 +50,8 @@ def main() -> None:
         )
         for one in found:
             points[drives.title, one.sequence_length, one.part, one.technique] = one
-    print(f"c = {c}\n")
-    print_head("part", "what is done")
-    for part in JPEG_PARTS:
-        print_row(part.name, part.summary)
-    print()
-    print_head("set", "K", "part", *NAMES)
-    for title in titles:
         for length in LENGTHS:
-            print_set(points, title, length)
+            print_set(points, drives.title, length)
     for length in LENGTHS:
         print_pooled(points, titles, length)
 

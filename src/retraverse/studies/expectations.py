@@ -131,8 +131,9 @@ def _rise(key: Condition, curve: Curve) -> _Case:
     if worst is None:
         return _Case(True, _name(key), 0)
     fall, before, after = worst
+    n_falls = "1 fall" if len(falls) == 1 else f"{len(falls)} falls"
     text = (
-        f"{_name(key)}: {'1 fall' if len(falls) == 1 else f'{len(falls)} falls'}, the largest {100 * fall:.1f} points from "
+        f"{_name(key)}: {n_falls}, the largest {100 * fall:.1f} points from "
         f"K = {before.sequence_length} ({_percent(before.accuracy)}) to "
         f"K = {after.sequence_length} ({_percent(after.accuracy)})"
     )

@@ -70,8 +70,8 @@ def best_table(records: Sequence[RunRecord]) -> Table:
             "100 % in the least time",
         ),
         tuple(rows),
-        "Each is the best of all runs of the study, which flatters it. A click opens the run. Fewer than some twenty candidates left make 100 % easy: see the "
-        "chapters' tables.",
+        "Each is the best of all runs of the study, which flatters it. A click opens the run. "
+        "Fewer than some twenty candidates left make 100 % easy: see the chapters' tables.",
         meanings("accuracy", "smallest K", "d", "t_VPR"),
     )
 
