@@ -46,6 +46,11 @@ def test_check_run_again_show(run: Run, tmp_path: Path) -> None:
     assert "6 runs: 6 done now, 0 before, 0 failed, 0 missing; 40 pictures" in first.stdout
     assert (tmp_path / "study" / "plan.toml").read_text() == PLAN
 
+    reported = run("report", "study", "--out", "pages", "--data", "data")
+    assert reported.returncode == 0, reported.stderr
+    assert "holds: Image bytes fall with the compression c." in reported.stdout
+    assert (tmp_path / "pages" / "index.html").is_file()
+
     again = json.loads(run("run", "plan.toml", "--out", "study", "--json").stdout)
     assert (again["n_ok"], again["n_kept"]) == (0, 6)
 

@@ -7,6 +7,7 @@ import typer
 
 from retraverse.cli.options import JsonOutput
 from retraverse.cli.output import print_json, progress, remark
+from retraverse.cli.study import print_expectations
 
 if TYPE_CHECKING:
     from retraverse.studies.engine import StudyResult
@@ -63,6 +64,7 @@ def reproduce(
             f"{name}: {result.n_runs} runs, {result.n_ok} done now, {result.n_kept} before, "
             f"{result.n_failed} failed, {result.n_missing} missing, {result.seconds:.0f} s"
         )
+    print_expectations(out / "studies")
     print(f"report: {index}")
 
 

@@ -13,7 +13,7 @@ from retraverse.cli.output import print_json, print_table, progress, remark
 if TYPE_CHECKING:
     from retraverse.studies.records import RunRecord
 
-__all__ = ["app", "check", "report", "run", "show"]
+__all__ = ["app", "check", "print_expectations", "report", "run", "show"]
 
 app = typer.Typer(no_args_is_help=True, help="Run a grid of settings on your datasets.")
 
@@ -151,7 +151,17 @@ def report(
         cache=cache,
         progress=progress(),
     )
+    print_expectations(study)
     print(f"report: {index}")
+
+
+def print_expectations(study: Path) -> None:
+    """Print what the thesis leads one to expect, and whether these records bear it out."""
+    from retraverse.studies.expectations import check_expectations
+    from retraverse.studies.light_records import read_light_records, study_folders
+
+    for expectation in check_expectations(read_light_records(study_folders(study))):
+        print(f"{expectation.verdict}: {expectation.claim} {expectation.numbers}")
 
 
 def _line(record: "RunRecord") -> tuple[Any, ...]:
