@@ -45,6 +45,7 @@ def test_the_chapters_ask_for_what_the_thesis_has(data: Path) -> None:
         assert pairs == uniform | one_sided
     sizes = {pair.query.resize for pair in of_chapter["chapter 7"].pairs}
     assert sizes == {16, 32, 64, 128, 256, 512, 1024}
+    assert {pair.query.compression for pair in of_chapter["chapter 7"].pairs} == {25}
     assert {pair.query.resize for pair in of_chapter["chapter 6, 224 pixels"].pairs} == {224}
 
 
