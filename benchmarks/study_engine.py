@@ -100,7 +100,10 @@ def measure_dask(data: Path, folder: Path) -> None:
     walls = {}
     for n_workers in (1, 2):
         with distributed.LocalCluster(
-            n_workers, threads_per_worker=1, host="127.0.0.1", dashboard_address=None
+            n_workers=n_workers,
+            threads_per_worker=1,
+            host="127.0.0.1",
+            dashboard_address=None,
         ) as cluster:
             address = cluster.scheduler_address
             study = folder / f"study {n_workers}"
