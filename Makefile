@@ -24,10 +24,11 @@ test-full: .venv/test
 	RETRAVERSE_SCALE=1 $(PYTEST) -q -n 2 --dist loadscope
 	$(MAKE) test-twin test-no-compiler
 
-# The NumPy twins of the kernels, although the compiled ones are there.
+# The NumPy twins of the kernels, although the compiled ones are there; not on whole real drives,
+# which they take minutes for.
 test-twin: .venv/test
 	RETRAVERSE_KERNELS=numpy $(PYTEST) -q -n 2 tests/unit/kernels tests/unit/techniques \
-		tests/oracle tests/golden tests/contract
+		tests/oracle tests/golden tests/contract --ignore tests/golden/test_int8_on_real_drives.py
 
 # Install and run where no C++ compiler is, and no extra either.
 test-no-compiler:

@@ -10,6 +10,7 @@ Names
 - `without_stops`, `measure_motion`: a drive without the frames on which nothing moved.
 - `worsened`, `worsen_frame`, `worsen_each`, `Worsening`: pictures resized and compressed.
 - `Encoder`, `encode_jpeg`, `QuantisationTables`: JPEG and its options.
+- `jpeg_traces`: how much JPEG took out of a picture, seen in its pixels.
 - `natural_key`, `PICTURE_SUFFIXES`: how folders are listed.
 
 Importing this package loads neither OpenCV nor Pillow.
@@ -19,6 +20,7 @@ from retraverse.images.decode import ColourOrder, GreyPath, decode_bgr, decode_g
 from retraverse.images.files import PICTURE_SUFFIXES
 from retraverse.images.frame import Frame
 from retraverse.images.jpeg import Encoder, encode_jpeg
+from retraverse.images.jpeg_traces import STRONG_TRACES, jpeg_traces
 from retraverse.images.ordering import natural_key
 from retraverse.images.quantisation import QuantisationTables
 from retraverse.images.sources import Source, open_traverse
@@ -37,6 +39,7 @@ from retraverse.images.worsen import (
 __all__ = [
     "MIN_MOTION",
     "PICTURE_SUFFIXES",
+    "STRONG_TRACES",
     "ColourOrder",
     "Encoder",
     "Frame",
@@ -52,6 +55,7 @@ __all__ = [
     "decode_grey",
     "encode_jpeg",
     "frame_bytes",
+    "jpeg_traces",
     "measure_motion",
     "natural_key",
     "open_traverse",

@@ -232,7 +232,8 @@ def _identity(choice: TechniqueChoice) -> tuple[dict[str, Any], tuple[Status, st
         if weights is not None:
             # Their content counts, not what they are called or where they lie.
             identity["weights"] = weights()
-            identity["parameters"].pop("weights", None)
+            for name in ("weights", "clean_weights"):
+                identity["parameters"].pop(name, None)
     except DataMissingError as error:
         return identity, ("missing", one_line_reason(error))
     except (RetraverseError, OSError) as error:

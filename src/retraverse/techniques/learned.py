@@ -19,14 +19,15 @@ Nothing here imports PyTorch before the first description.
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
 from retraverse.errors import ConfigError
-from retraverse.images import Frame
+from retraverse.images import STRONG_TRACES, Frame, jpeg_traces
 from retraverse.techniques.base import Description, Descriptions, Layout
 from retraverse.techniques.batching import Runner, fastest_batch, slices
 from retraverse.techniques.extras import import_extra
@@ -35,7 +36,12 @@ from retraverse.techniques.parameters import check_range, parameter
 from retraverse.techniques.pooling import flat, unit_rows
 from retraverse.techniques.vectors import cosine_similarity
 from retraverse.types import Array, FloatArray, ImageArray
-from retraverse.weights.store import find_weights, load_tensors
+from retraverse.weights.store import (
+    CLEAN_WEIGHTS,
+    find_weights,
+    load_tensors,
+    weights_metadata,
+)
 
 if TYPE_CHECKING:
     import torch
@@ -44,6 +50,7 @@ __all__ = ["LearnedParameters", "LearnedTechnique", "Runner"]
 
 Runtime = Literal["torch", "onnx"]
 ONNX_SUFFIX = ".onnx"
+SAME = "same"
 
 
 @dataclass(frozen=True)
@@ -57,6 +64,12 @@ class LearnedParameters:
 
     weights: str = parameter(
         "", "name of stored weights, or the path of a weights file", compared=False
+    )
+    clean_weights: str = parameter(
+        "auto",
+        "other weights for pictures that show no strong JPEG: a name, a path, same (none), or "
+        "auto (those that a tuning for JPEG began with, where the weights say so)",
+        compared=False,
     )
     runtime: Runtime = parameter(
         "torch", "what runs the network: torch (PyTorch) or onnx (ONNX Runtime)", compared=False
@@ -90,6 +103,7 @@ class LearnedTechnique(ABC):
         self._network: torch.nn.Module | None = None
         self._runner: Runner | None = None
         self._fingerprint: str | None = None
+        self._for_clean: LearnedTechnique | None = None
         self._batch_size = parameters.batch
 
     # What a subclass defines.
@@ -148,6 +162,19 @@ class LearnedTechnique(ABC):
         MissingExtraError
             If the runtime is not installed.
         """
+        other = self.for_clean_pictures()
+        if other is None:
+            return self._describe_alike(images)
+        # Each picture by the network that was made for it; both answer in the same terms.
+        harmed = [jpeg_traces(image) >= STRONG_TRACES for image in images]
+        described: dict[int, Description] = {}
+        for technique, is_meant in ((self, True), (other, False)):
+            rows = [row for row, strong in enumerate(harmed) if strong is is_meant]
+            chosen = technique._describe_alike([images[row] for row in rows])
+            described |= zip(rows, chosen, strict=True)
+        return [described[row] for row in range(len(images))]
+
+    def _describe_alike(self, images: Sequence[ImageArray]) -> list[Description]:
         if len(images) <= 1:
             return self._describe_at_once(images)
         parts = slices(len(images), self.batch_size())
@@ -178,7 +205,9 @@ class LearnedTechnique(ABC):
         return cosine_similarity(queries, references, non_negative=False)
 
     def fingerprint(self) -> str:
-        """Return the SHA-256 of the weights file, in hexadecimal: part of a map's identity.
+        """Return the SHA-256 of the weights, in hexadecimal: part of a map's identity.
+
+        Of the file; with other weights for clean pictures, of both files' and the threshold.
 
         Raises
         ------
@@ -187,8 +216,32 @@ class LearnedTechnique(ABC):
         """
         with self._lock:
             if self._fingerprint is None:
-                self._fingerprint = file_digest(self.weights_path())
+                own, other = file_digest(self.weights_path()), self.for_clean_pictures()
+                both = "" if other is None else f"{own} {other.fingerprint()} {STRONG_TRACES}"
+                self._fingerprint = sha256(both.encode()).hexdigest() if both else own
             return self._fingerprint
+
+    def for_clean_pictures(self) -> "LearnedTechnique | None":
+        """Return what describes pictures without strong traces of JPEG, None if this does.
+
+        Raises
+        ------
+        DataMissingError
+            If the weights are not there.
+        """
+        with self._lock:
+            name = self._clean_weights()
+            if name and self._for_clean is None:
+                plain = replace(self.parameters, weights=name, clean_weights=SAME)
+                self._for_clean = type(self)(plain)
+            return self._for_clean
+
+    def _clean_weights(self) -> str:
+        """Return the name of the weights for clean pictures, "" if there are none."""
+        asked = str(getattr(self.parameters, "clean_weights", SAME))
+        if asked == "auto":
+            return weights_metadata(self.weights_path()).get(CLEAN_WEIGHTS, "")
+        return "" if asked == SAME else asked
 
     # The network itself.
 

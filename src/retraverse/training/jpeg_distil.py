@@ -49,12 +49,12 @@ from retraverse.training.pictures import (
 from retraverse.training.proxy import retrieval_figures
 from retraverse.training.tuned_network import Outputs, as_input, learned_technique, tunable
 from retraverse.types import ImageArray, Progress, no_progress
+from retraverse.weights.records import is_name
 from retraverse.weights.store import load_tensors
 
-__all__ = ["DistilSettings", "JpegDistil", "distil_loss", "train_jpeg_distil"]
+__all__ = ["DistilSettings", "JpegDistil", "distil_loss", "scaled_views", "train_jpeg_distil"]
 
 
-_FROZEN = ("_conv_stem", "_blocks.0", "_blocks.1")
 _INNER_BLOCK = 7
 """Of EfficientNet-Lite0: the last one before its positions become four times fewer and deeper."""
 
@@ -68,9 +68,8 @@ class DistilSettings:
     inner: tuple[str, ...] | None = None
     """Modules inside the network that are matched too, with half the weight; None = block 7 of
     EfficientNet-Lite0, for other networks none."""
-    frozen: tuple[str, ...] | None = None
-    """Modules that do not learn, and with them all before; None = EfficientNet-Lite0's stem and
-    first two blocks, which take half the time, for other networks none."""
+    frozen: tuple[str, ...] = ()
+    """Modules that do not learn, such as ``"_conv_stem"``."""
     pictures: int = 8
     """Different pictures in a batch."""
     views: int = 2
@@ -80,7 +79,8 @@ class DistilSettings:
     small_share: float = 0.8
     """Share of the steps, from the first, in which the network takes smaller pictures."""
     small_size: int = 160
-    """Side in pixels of what it takes then; half the time of 224."""
+    """Side in pixels of what it takes then; half the time of 224. Views are smaller in the same
+    measure, so that a block of JPEG is as large to the network as it will be."""
     whole: float = 1.0
     """Weight of the cosine of whole outputs."""
     position: float = 1.0
@@ -91,10 +91,15 @@ class DistilSettings:
     """Weight of the batch's similarities."""
     temperature: float = 0.05
     """Differences of similarity that count are of this size."""
-    mix: CompressionMix = field(default_factory=CompressionMix)
+    mix: CompressionMix = field(
+        default_factory=lambda: CompressionMix(
+            clean=0.05, bands=((0.65, 95, 99), (0.25, 85, 94), (0.1, 40, 84))
+        )
+    )
+    """Mostly strong: clean pictures are left to the original, see `jpeg_traces`."""
     view: ViewSettings = field(default_factory=ViewSettings)
     loop: LoopSettings = field(
-        default_factory=lambda: LoopSettings(steps=1000, learning_rate=1e-3, averaging=0.99)
+        default_factory=lambda: LoopSettings(steps=1400, learning_rate=1e-3, averaging=0.99)
     )
 
     def __post_init__(self) -> None:
@@ -134,23 +139,27 @@ class JpegDistil:
         inner = _inner_modules(technique, settings)
         self.technique = technique
         self._smaller = _smaller(technique, settings)
+        self._smaller_view = scaled_views(settings.view, self._smaller, technique)
         self.settings = settings
         self._pictures = pictures
         first = technique.network() if start is None else _network_of(technique, start)
         self._start = "" if start is None else file_digest(start)
-        learning = tunable(first, _frozen_modules(technique, settings))
+        learning = tunable(first, settings.frozen)
         self.network = Outputs(learning, inner)
         self._original = Outputs(folded(technique.network()).requires_grad_(False), inner)
         self._weights = [0.5] * len(inner) + [1.0]
 
     def batch(self, step: int, random: np.random.Generator) -> _Batch:
         """Return the batch of a step."""
+        small = step < self.settings.small_share * self.settings.loop.steps
+        technique = self._smaller if small else self.technique
+        views = self._smaller_view if small else self.settings.view
         chosen = random.choice(len(self._pictures), self.settings.pictures, replace=False)
         clean: list[ImageArray] = []
         compressed: list[ImageArray] = []
         for number in chosen:
             picture = self._pictures[number]
-            first = draw_view(random, picture.shape[:2], self.settings.view)
+            first = draw_view(random, picture.shape[:2], views)
             for turn in range(self.settings.views):
                 view = nearby_view(random, first, picture.shape[:2]) if turn else first
                 seen = take_view(picture, view, random)
@@ -159,8 +168,6 @@ class JpegDistil:
                     seen_through_jpeg(seen, self.settings.mix.draw(random))
                     for _ in range(self.settings.copies)
                 ]
-        small = step < self.settings.small_share * self.settings.loop.steps
-        technique = self._smaller if small else self.technique
         return _Batch(as_input(technique, clean), as_input(technique, compressed))
 
     def loss(self, batch: _Batch) -> Tensor:
@@ -194,18 +201,21 @@ def _inner_modules(technique: LearnedTechnique, settings: DistilSettings) -> tup
     return (f"_blocks.{_INNER_BLOCK}",) if is_later else ()
 
 
-def _frozen_modules(technique: LearnedTechnique, settings: DistilSettings) -> tuple[str, ...]:
-    if settings.frozen is not None:
-        return settings.frozen
-    return _FROZEN if technique.name == "efficientnet" else ()
-
-
 def _smaller(technique: LearnedTechnique, settings: DistilSettings) -> LearnedTechnique:
     """Return the technique with smaller pictures, or as it is where their size is fixed."""
     parameters = technique.parameters
     if getattr(parameters, "resolution", 0) <= settings.small_size:
         return technique
     return type(technique)(replace(parameters, resolution=settings.small_size))
+
+
+def scaled_views(
+    view: ViewSettings, smaller: LearnedTechnique, technique: LearnedTechnique
+) -> ViewSettings:
+    """Return views smaller by as much as the smaller technique's pictures are."""
+    scale = smaller.input_shape()[1] / technique.input_shape()[1]
+    low, high = (max(8, round(width * scale)) for width in view.widths)
+    return replace(view, widths=(low, high))
 
 
 def distil_loss(ours: Tensor, theirs: Tensor, settings: DistilSettings) -> Tensor:
@@ -308,4 +318,11 @@ def train_jpeg_distil(
         settings=settings,
         source=f"{len(pictures)} pictures of {Path(name).name}",
         figures=figures,
+        clean_weights=_began_with(technique),
     )
+
+
+def _began_with(technique: LearnedTechnique) -> str:
+    """Return the name of the original's weights; "" for a file, which may not be there later."""
+    name = str(technique.parameters.weights)
+    return name if is_name(name) else ""

@@ -40,6 +40,7 @@ from retraverse.types import Progress, no_progress
 __all__ = ["Classifier", "JpegLabels", "LabelSettings", "train_jpeg_labels"]
 
 THESIS_COMPRESSION = 97
+_GRID = 4
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ class LabelSettings:
     )
     view: ViewSettings = field(default_factory=ViewSettings)
     loop: LoopSettings = field(
-        default_factory=lambda: LoopSettings(steps=300, learning_rate=3e-4, averaging=0.98)
+        default_factory=lambda: LoopSettings(steps=300, learning_rate=1e-4, averaging=0.98)
     )
 
     def __post_init__(self) -> None:
@@ -67,7 +68,10 @@ class LabelSettings:
 
 
 class Classifier(nn.Module):
-    """A network, and one linear layer on the mean of its maps.
+    """A network, and one linear layer on its maps' means over a grid of 4 x 4.
+
+    The grid keeps where in the picture something is, as the thesis' fc6 does: what places are
+    told apart by must not be unlearned.
 
     Parameters
     ----------
@@ -76,12 +80,16 @@ class Classifier(nn.Module):
     channels : int
         C.
     n_classes : int
+    is_map : bool
+        Whether it gives (N, C, H, W).
     """
 
-    def __init__(self, network: nn.Module, channels: int, n_classes: int) -> None:
+    def __init__(
+        self, network: nn.Module, channels: int, n_classes: int, *, is_map: bool = True
+    ) -> None:
         super().__init__()
         self.network = network
-        self.classes = nn.Linear(channels, n_classes)
+        self.classes = nn.Linear(channels * (_GRID**2 if is_map else 1), n_classes)
         # At first no class is preferred, so that the network's own weights are not shaken.
         nn.init.zeros_(self.classes.weight)
         nn.init.zeros_(self.classes.bias)
@@ -89,7 +97,9 @@ class Classifier(nn.Module):
     def forward(self, x: Tensor) -> Tensor:
         """Return the classes' scores, (N, n_classes)."""
         features = self.network(x)
-        pooled = features.mean(dim=(2, 3)) if features.ndim == 4 else features
+        if features.ndim == 4:
+            features = functional.adaptive_avg_pool2d(features, _GRID)
+        pooled = features.flatten(1)
         scores: Tensor = self.classes(functional.normalize(pooled, dim=1) * pooled.shape[1] ** 0.5)
         return scores
 
@@ -104,7 +114,9 @@ class JpegLabels:
         self.settings = settings
         self._shown = shown
         network = tunable(technique.network())
-        self.network = Classifier(network, _channels(technique), len(shown.classes))
+        shape = _output_shape(technique)
+        is_map = len(shape) == 4
+        self.network = Classifier(network, shape[1], len(shown.classes), is_map=is_map)
 
     def batch(self, step: int, random: np.random.Generator) -> tuple[Tensor, Tensor]:
         """Return compressed pictures as the network takes them, and their classes."""
@@ -192,11 +204,11 @@ def train_jpeg_labels(
     )
 
 
-def _channels(technique: LearnedTechnique) -> int:
-    """Return the length of the second axis of the network's output."""
+def _output_shape(technique: LearnedTechnique) -> tuple[int, ...]:
+    """Return the shape of the network's output for one picture."""
     with torch.no_grad():
         output = technique.network()(torch.zeros(1, *technique.input_shape()))
-    return int(output.shape[1])
+    return tuple(output.shape)
 
 
 @torch.inference_mode()

@@ -14,6 +14,7 @@ from retraverse._version import __version__
 from retraverse.files import write_whole
 from retraverse.training.loop import Trained
 from retraverse.training.report import write_training_report
+from retraverse.weights.store import CLEAN_WEIGHTS
 
 __all__ = ["Outcome", "write_outcome"]
 
@@ -46,6 +47,7 @@ def write_outcome(
     source: str,
     figures: Mapping[str, float],
     half: bool = True,
+    clean_weights: str = "",
 ) -> Outcome:
     """Write weights (as float16 unless told otherwise), summary and page; each whole.
 
@@ -63,6 +65,8 @@ def write_outcome(
     figures : mapping of name to float
     half : bool
         Whether floats are stored as float16.
+    clean_weights : str
+        Name of the weights that serve clean pictures better; "" = none do.
     """
     from safetensors.numpy import save
 
@@ -76,6 +80,8 @@ def write_outcome(
         "versions": {"retraverse": __version__, "torch": torch.__version__},
     }
     text = {name: json.dumps(value) for name, value in about.items()}
+    if clean_weights:
+        text[CLEAN_WEIGHTS] = clean_weights
     write_whole(folder / WEIGHTS, save(arrays, text))
     summary = {**about, "losses": [float(f"{loss:.6g}") for loss in trained.losses]}
     write_whole(folder / SUMMARY, json.dumps(summary, indent=1).encode())

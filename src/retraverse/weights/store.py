@@ -31,12 +31,17 @@ from retraverse.weights.records import (
 from retraverse.weights.weight_file import WeightFile
 
 __all__ = [
+    "CLEAN_WEIGHTS",
     "find_weights",
     "import_weights",
     "load_tensors",
     "missing_advice",
     "weights_folder",
+    "weights_metadata",
 ]
+
+CLEAN_WEIGHTS = "clean_weights"
+"""Metadata of tuned weights: the name of those they began with, which serve clean pictures."""
 
 
 def find_weights(name_or_path: str | os.PathLike[str]) -> Path:
@@ -109,6 +114,21 @@ def load_tensors(path: Path) -> WeightFile:
     from retraverse.weights.readers import read_weights
 
     return read_weights(path)
+
+
+def weights_metadata(path: Path) -> Mapping[str, str]:
+    """Return what a file of weights says of itself; only safetensors files say anything.
+
+    Raises
+    ------
+    InputError
+        If it is a damaged safetensors file.
+    """
+    from retraverse.weights.readers import safetensors_file
+
+    with path.open("rb") as file:
+        head = file.read(16)
+    return safetensors_file.read_metadata(path) if safetensors_file.recognise(head, path) else {}
 
 
 def import_weights(

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from safetensors.numpy import load_file, save_file
+from skimage import data
 from tests.unit.techniques.tiny_network import (
     TinyNetwork,
     TinyTechnique,
@@ -17,10 +19,13 @@ from tests.unit.techniques.tiny_network import (
 
 import retraverse as rt
 from retraverse.errors import ConfigError, DataMissingError, MapError, MissingExtraError
-from retraverse.images import Frame
+from retraverse.images import Frame, decode_bgr, encode_jpeg
 from retraverse.maps import TechniqueRecord
 from retraverse.techniques import BatchTechnique, FingerprintedTechnique, registry
+from retraverse.techniques.file_digest import file_digest
 from retraverse.techniques.torch_runtime import torch_threads
+from retraverse.types import ImageArray
+from retraverse.weights.store import CLEAN_WEIGHTS
 
 
 @pytest.fixture
@@ -192,3 +197,49 @@ def test_parameters_out_of_range(wrong: dict[str, Any], message: str) -> None:
 
 def test_weights_may_be_a_path(tmp_path: Path) -> None:
     assert rt.technique("efficientnet", weights=tmp_path).parameters.weights == str(tmp_path)
+
+
+def test_clean_pictures_by_other_weights(tmp_path: Path) -> None:
+    """Tuned weights serve pictures that JPEG has harmed; the others go to the untuned network."""
+    untuned = write_tiny_weights(tmp_path / "untuned.safetensors", seed=0)
+    tuned = write_tiny_weights(tmp_path / "tuned.safetensors", seed=1)
+    both = with_weights(tuned, clean_weights=str(untuned))
+    clean = photographs()
+    harmed = [through_jpeg(picture, 97) for picture in clean]
+    images = [clean[0], harmed[0], harmed[1], clean[1], clean[2]]
+    wanted = (untuned, tuned, tuned, untuned, untuned)
+    for image, weights, described in zip(images, wanted, both.describe_batch(images), strict=True):
+        alone = with_weights(weights, clean_weights="same").describe(image)["descriptor"]
+        np.testing.assert_allclose(described["descriptor"], alone, atol=1e-6)
+        np.testing.assert_allclose(both.describe(image)["descriptor"], alone, atol=1e-6)
+
+
+def test_weights_say_which_weights_serve_clean_pictures(tmp_path: Path) -> None:
+    untuned = write_tiny_weights(tmp_path / "untuned.safetensors", seed=0)
+    tuned = write_tiny_weights(tmp_path / "tuned.safetensors", seed=1)
+    plain = with_weights(tuned)
+    assert plain.for_clean_pictures() is None
+    saying = tmp_path / "saying.safetensors"
+    save_file(load_file(tuned), saying, {CLEAN_WEIGHTS: str(untuned)})
+    other = with_weights(saying).for_clean_pictures()
+    assert other is not None
+    assert other.fingerprint() == with_weights(untuned).fingerprint()
+    assert with_weights(saying, clean_weights="same").for_clean_pictures() is None
+    # Another way to describe clean pictures is another technique.
+    assert len({with_weights(saying).fingerprint(), file_digest(saying), file_digest(tuned)}) == 3
+
+
+def test_weights_for_clean_pictures_that_are_not_here(tmp_path: Path) -> None:
+    tuned = write_tiny_weights(tmp_path / "tuned.safetensors")
+    technique = with_weights(tuned, clean_weights="nowhere")
+    with pytest.raises(DataMissingError, match="nowhere"):
+        technique.describe(photographs()[0])
+
+
+def photographs() -> list[ImageArray]:
+    names = ("astronaut", "chelsea", "coffee")
+    return [np.ascontiguousarray(getattr(data, name)()[::3, ::3]) for name in names]
+
+
+def through_jpeg(picture: ImageArray, compression: int) -> ImageArray:
+    return decode_bgr(encode_jpeg(picture, compression))[..., ::-1]

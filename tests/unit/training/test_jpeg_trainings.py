@@ -16,11 +16,12 @@ from retraverse.training.jpeg_distil import (
     DistilSettings,
     JpegDistil,
     distil_loss,
+    scaled_views,
     train_jpeg_distil,
 )
 from retraverse.training.jpeg_labels import JpegLabels, LabelSettings, train_jpeg_labels
 from retraverse.training.loop import run_loop
-from retraverse.training.pictures import CompressionMix, LabelledPictures
+from retraverse.training.pictures import CompressionMix, LabelledPictures, ViewSettings
 
 DISTIL = DistilSettings(pictures=3, loop=replace(QUICK, steps=60, learning_rate=0.02))
 ONE_BLOCK = {"block": 1, "resolution": 64, "batch": 1}
@@ -75,6 +76,12 @@ def test_a_batch_depends_on_its_random_numbers_alone() -> None:
     assert not torch.equal(first.clean, other.clean)
 
 
+def test_a_block_of_jpeg_is_as_large_to_a_smaller_network() -> None:
+    whole, half = (rt.technique("efficientnet", resolution=side) for side in (224, 112))
+    views = scaled_views(ViewSettings(widths=(90, 230)), half, whole)  # type: ignore[arg-type]
+    assert views == ViewSettings(widths=(45, 115))
+
+
 def test_clean_copies_are_the_views_themselves() -> None:
     settings = replace(DISTIL, mix=CompressionMix(clean=1.0), copies=1)
     batch = JpegDistil(TinyTechnique(), pictures(8), settings).batch(0, np.random.default_rng(0))
@@ -114,7 +121,8 @@ def test_weights_go_back_into_the_technique(tmp_path: Path) -> None:
     outcomes = run_both(tmp_path, replace(QUICK, steps=3, learning_rate=0.01))
     plain = rt.technique("efficientnet", **ONE_BLOCK).describe(pictures(11)[0])["descriptor"]
     for outcome in outcomes.values():
-        tuned = rt.technique("efficientnet", weights=str(outcome.weights), **ONE_BLOCK)
+        always = {**ONE_BLOCK, "weights": str(outcome.weights), "clean_weights": "same"}
+        tuned = rt.technique("efficientnet", **always)
         descriptor = tuned.describe(pictures(11)[0])["descriptor"]
         assert descriptor.shape == plain.shape
         assert 0.3 < float(descriptor @ plain) < 0.99999
@@ -123,6 +131,11 @@ def test_weights_go_back_into_the_technique(tmp_path: Path) -> None:
         page = outcome.report.read_text()
         assert "<svg" in page
         assert "http" not in page.replace("http://www.w3.org", "")
+    # What is learned without labels speaks the original's language: clean pictures go to that one.
+    for name, as_untuned in (("distil", True), ("labels", False)):
+        tuned = rt.technique("efficientnet", weights=str(outcomes[name].weights), **ONE_BLOCK)
+        likeness = float(tuned.describe(pictures(11)[0])["descriptor"] @ plain)
+        assert (likeness > 0.999999) == as_untuned
     assert 0 <= outcomes["labels"].figures["named right at c = 97"] <= 1
     assert 0 <= outcomes["distil"].figures["tuned, 160 x 120, c = 97"] <= 1
 

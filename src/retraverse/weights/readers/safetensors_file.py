@@ -5,7 +5,7 @@ from pathlib import Path
 from retraverse.weights.readers.guard import reading
 from retraverse.weights.weight_file import WeightFile
 
-__all__ = ["read", "recognise"]
+__all__ = ["read", "read_metadata", "recognise"]
 
 _LARGEST_HEADER = 100_000_000
 """As the format's own library."""
@@ -32,5 +32,23 @@ def read(path: Path) -> WeightFile:
             with safe_open(path, framework="np") as file:
                 tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
                 return WeightFile(tensors, dict(file.metadata() or {}), "safetensors")
+        except SafetensorError as error:
+            raise ValueError(str(error)) from error
+
+
+def read_metadata(path: Path) -> dict[str, str]:
+    """Return what a safetensors file says of itself, without its arrays.
+
+    Raises
+    ------
+    InputError
+        If the file is damaged.
+    """
+    from safetensors import SafetensorError, safe_open
+
+    with reading(path, "a safetensors file"):
+        try:
+            with safe_open(path, framework="np") as file:
+                return dict(file.metadata() or {})
         except SafetensorError as error:
             raise ValueError(str(error)) from error
