@@ -13,10 +13,19 @@ import numpy as np
 
 from retraverse.errors import MissingExtraError
 from retraverse.types import Array
+from retraverse.weights.readers.apart import read_apart
 from retraverse.weights.readers.guard import Budget, reading
 from retraverse.weights.weight_file import WeightFile
 
-__all__ = ["HDF5_START", "array_of", "datasets_below", "open_hdf5", "read", "recognise"]
+__all__ = [
+    "HDF5_START",
+    "array_of",
+    "datasets_below",
+    "open_hdf5",
+    "read",
+    "read_here",
+    "recognise",
+]
 
 HDF5_START = b"\x89HDF\r\n\x1a\n"
 _GROWTH = 200
@@ -30,7 +39,7 @@ def recognise(head: bytes, path: Path) -> bool:
 
 
 def read(path: Path) -> WeightFile:
-    """Read every numeric data set of an HDF5 file.
+    """Read every numeric data set of an HDF5 file, in a process of its own.
 
     Raises
     ------
@@ -39,6 +48,11 @@ def read(path: Path) -> WeightFile:
     MissingExtraError
         If h5py is not installed.
     """
+    return read_apart(__name__, path, "a Keras HDF5 file")
+
+
+def read_here(path: Path) -> WeightFile:
+    """Do so in this process, which a damaged file may crash or keep busy for ever."""
     with reading(path, "a Keras HDF5 file"), open_hdf5(path) as file:
         root = file.get("model_weights", file)
         budget = Budget(path.stat().st_size, _GROWTH)

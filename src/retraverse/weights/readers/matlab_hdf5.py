@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 
 from retraverse.types import Array
+from retraverse.weights.readers.apart import read_apart
 from retraverse.weights.readers.guard import Budget, reading
 from retraverse.weights.readers.keras import HDF5_START, array_of, open_hdf5
 from retraverse.weights.weight_file import WeightFile
 
-__all__ = ["read", "recognise"]
+__all__ = ["read", "read_here", "recognise"]
 
 _GROWTH = 200
 _DEEPEST, _MOST_VALUES = 32, 100_000
@@ -28,7 +29,7 @@ def recognise(head: bytes, path: Path) -> bool:
 
 
 def read(path: Path) -> WeightFile:
-    """Read the arrays of a version 7.3 MAT-file.
+    """Read the arrays of a version 7.3 MAT-file, in a process of its own.
 
     Raises
     ------
@@ -37,6 +38,11 @@ def read(path: Path) -> WeightFile:
     MissingExtraError
         If h5py is not installed.
     """
+    return read_apart(__name__, path, "a MATLAB 7.3 file")
+
+
+def read_here(path: Path) -> WeightFile:
+    """Do so in this process, which a damaged file may crash or keep busy for ever."""
     with reading(path, "a MATLAB 7.3 file"), open_hdf5(path) as file:
         reader = _Reader(file, Budget(path.stat().st_size, _GROWTH))
         for name in file:
