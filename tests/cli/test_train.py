@@ -5,6 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from safetensors.numpy import load_file
+from tests.unit.techniques.seeded_weights import seeded_parameters
 from tests.unit.training.tiny import pictures, write_pictures
 from typer.testing import CliRunner
 
@@ -59,6 +61,15 @@ def test_deepseqslam(classes: Path, tmp_path: Path) -> None:
     words = ("-o", tmp_path / "out", "-k", 2, "--steps", 3, "--threads", 1)
     said = train("deepseqslam", classes / "a", *words, "--set", "cnn=sad(resolution=8)")
     assert 0 <= said["figures"]["own windows named right"] <= 1
+
+
+def test_a_vocabulary_for_regionvlad(classes: Path, tmp_path: Path) -> None:
+    weights = seeded_parameters("regionvlad", tmp_path)["weights"]
+    out = tmp_path / "words.safetensors"
+    words = ("--set", f"weights={weights}", "--set", "words=4")
+    said = train("regionvlad", classes / "a", "-o", out, *words)
+    assert said == {"vocabulary": str(out), "words": 4}
+    assert load_file(out)["centres"].shape == (4, 384)
 
 
 def test_wrong_input(classes: Path, tmp_path: Path) -> None:

@@ -205,6 +205,29 @@ def netvlad(
     _say(outcome, json_output)
 
 
+@app.command("regionvlad")
+def regionvlad(
+    drive: Drive,
+    out: Annotated[Path, typer.Option("--out", "-o", help="The vocabulary's file to write.")],
+    settings: Settings = None,
+    seed: Seed = 0,
+    json_output: JsonOutput = False,
+) -> None:
+    """Build RegionVLAD's vocabulary from pictures of your own."""
+    _need_torch()
+    from retraverse.techniques.regionvlad import RegionVlad, build_vocabulary
+    from retraverse.training.tuned_network import learned_technique
+
+    technique = learned_technique("regionvlad", dict(read_settings("--set", settings)))
+    assert isinstance(technique, RegionVlad)
+    frames = open_traverse(drive)
+    build_vocabulary(frames, out, technique=technique, seed=seed, progress=progress())
+    if json_output:
+        print_json({"vocabulary": str(out), "words": technique.parameters.words})
+    else:
+        remark(f"vocabulary: {out} (regionvlad's parameter vocabulary takes this path)")
+
+
 def _loop(
     default: "LoopSettings",
     steps: int | None,

@@ -52,7 +52,7 @@ class RegionVladParameters(LearnedParameters):
     )
     vocabulary: str = parameter(
         "regionvlad-vocabulary",
-        "vocabulary of `build_vocabulary`: a name in the store or the path of a .safetensors",
+        "vocabulary of `retraverse train regionvlad`: a name in the store or the path of a .safetensors",
         compared=False,
     )
     words: int = parameter(256, "words of the vocabulary, 2 to 4096")
@@ -160,8 +160,8 @@ class RegionVlad(LearnedTechnique):
         except DataMissingError as error:
             raise DataMissingError(
                 f"vocabulary {self.parameters.vocabulary!r} is not here: build one from your own "
-                "pictures with retraverse.techniques.regionvlad.build_vocabulary(traverse, "
-                "'vocabulary.safetensors') and set the parameter vocabulary to that file"
+                "pictures with `retraverse train regionvlad DRIVE --out vocabulary.safetensors` "
+                "and set the parameter vocabulary to that file"
             ) from error
 
     def fingerprint(self) -> str:

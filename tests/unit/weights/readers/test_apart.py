@@ -1,5 +1,6 @@
 """What a parser does to its own process is one line here."""
 
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +41,6 @@ def test_a_parser_that_crashes(tmp_path: Path) -> None:
 
 def test_nothing_is_left_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "tmp").mkdir()
-    monkeypatch.setattr(apart.tempfile, "tempdir", str(tmp_path / "tmp"))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "tmp"))
     apart.read_apart(MODULE, saying(tmp_path, ""), "a test")
     assert list((tmp_path / "tmp").iterdir()) == []
