@@ -1,11 +1,13 @@
 """Print the thesis' chapter 5 on real drives: a network tuned for JPEG against others, as tables.
 
-Run: .venv/bin/python benchmarks/jpeg_tuned.py [DATA_FOLDER [WEIGHTS_TUNED_BY_LABELS]]
+Run: .venv/bin/python benchmarks/jpeg_tuned.py [DATA_FOLDER [ROW=TECHNIQUE=WEIGHTS ...]]
+Every further ROW is a network of one's own tuning, such as
+"tuned by labels=efficientnet=labels/weights.safetensors".
 Accuracy of the windows answered at seven compressions (c = 0: pictures as they are; JPEG quality
 100 - c, Pillow's defaults), query and map alike, then unlike; single frames and K = 5, 10; ±2
 frames. Pictures are compressed at their own size, stromovka at 224 x 224 (as chapter 6 resizes).
 Intervals: 95 %, bootstrap over blocks of 10 neighbouring windows, 2,000 draws, seed 0; the last
-table has the paired difference of the tuned network and the untuned one.
+table has the paired difference of every tuned network and the untuned one it began as.
 """
 
 import sys
@@ -35,7 +37,15 @@ COMPRESSIONS = (0, 50, 80, 90, 95, 97, 99)
 LENGTHS = (1, 5, 10)
 UNLIKE = ((0, 97), (97, 0), (50, 97), (0, 99), (99, 0), (97, 99))
 """c of the query, c of the map."""
-TUNED, BY_LABELS, UNTUNED = "tuned without labels", "tuned by labels", "untuned"
+ROWS: dict[str, tuple[str, dict[str, Any]]] = {
+    "tuned": ("efficientnet", {"weights": "jpeg"}),
+    "tuned, for clean pictures too": ("efficientnet", {"weights": "jpeg", "clean_weights": "same"}),
+    "untuned": ("efficientnet", {}),
+    "tuned, block 7": ("efficientnet", {"weights": "jpeg", "block": 7}),
+    "untuned, block 7": ("efficientnet", {"block": 7}),
+    "HOG": ("hog", {}),
+    "CoHOG": ("cohog", {}),
+}
 Side = Mapping[int, Descriptions]
 Hits = dict[tuple[str, int, int, int], np.ndarray]
 """(technique, c of the query, c of the map, K) -> whether each window is right."""
@@ -44,20 +54,31 @@ Hits = dict[tuple[str, int, int, int], np.ndarray]
 def main() -> None:
     for pictures in picture_sets(data_folder()):
         found: Hits = {}
-        for name, technique in techniques().items():
-            found |= hits_of(name, technique, pictures)
+        for label, (name, parameters) in rows().items():
+            found |= hits_of(label, rt.technique(name, **parameters), pictures)
         print_alike(pictures, found)
         print_unlike(pictures, found)
         print_gain(pictures, found)
 
 
-def techniques() -> dict[str, Technique]:
-    """Return what is compared; the network tuned by labels where its weights are given."""
-    named: dict[str, tuple[str, dict[str, Any]]] = {TUNED: ("efficientnet", {"weights": "jpeg"})}
-    if len(sys.argv) > 2:
-        named[BY_LABELS] = ("efficientnet", {"weights": str(Path(sys.argv[2]).resolve())})
-    named |= {UNTUNED: ("efficientnet", {}), "HOG": ("hog", {}), "CoHOG": ("cohog", {})}
-    return {label: rt.technique(name, **values) for label, (name, values) in named.items()}
+def rows() -> dict[str, tuple[str, dict[str, Any]]]:
+    """Return what is compared; of networks that were given, the untuned ones too."""
+    named = dict(ROWS)
+    for given in sys.argv[2:]:
+        label, name, weights = given.split("=")
+        if name != "efficientnet":
+            named[f"{name}, untuned"] = (name, {})
+        named[label] = (name, {"weights": str(Path(weights).resolve())})
+    return named
+
+
+def untuned_of(label: str) -> str | None:
+    """Return the row of the network that a tuned one began as."""
+    name, parameters = rows()[label]
+    if "weights" not in parameters:
+        return None
+    plain = {key: value for key, value in parameters.items() if key == "block"}
+    return next(row for row, what in rows().items() if what == (name, plain))
 
 
 def hits_of(name: str, technique: Technique, pictures: PictureSet) -> Hits:
@@ -103,11 +124,14 @@ def print_gain(pictures: PictureSet, found: Hits) -> None:
     print_head("K", "technique", *(f"c = {c}" for c in COMPRESSIONS), "query 0, map 97")
     pairs = (*((c, c) for c in COMPRESSIONS), (0, 97))
     for length in LENGTHS:
-        for name in [name for name in names(found) if name in (TUNED, BY_LABELS)]:
-            cells = []
-            for query, map_ in pairs:
-                untuned = found[UNTUNED, query, map_, length]
-                cells.append(interval(found[name, query, map_, length] - untuned))
+        for name in names(found):
+            untuned = untuned_of(name)
+            if untuned is None:
+                continue
+            cells = [
+                interval(found[name, query, map_, length] - found[untuned, query, map_, length])
+                for query, map_ in pairs
+            ]
             print_row(length, name, *cells)
 
 

@@ -88,4 +88,5 @@ def test_the_batch_chosen_is_never_slower(benchmark: Any, graph: Path, runtime: 
     info["batch chosen"] = technique.batch_size()
     info["batches over one by one"] = round(seconds["batches"] / seconds["one by one"], 3)
     benchmark.pedantic(lambda: technique.describe_batch(images), rounds=2)
-    assert info["batches over one by one"] <= 1.05
+    # Where it is 1, both sides are the same code and the ratio is the machine's noise.
+    assert info["batch chosen"] == 1 or info["batches over one by one"] <= 1.05

@@ -97,6 +97,42 @@ def test_pages_are_quiet_and_fit(open_page: Opener, report: Path, name: str, wid
     assert others == [(report / f"{name}.html").as_uri()]
 
 
+def test_a_page_begins_with_what_was_found(open_page: Opener, report: Path) -> None:
+    opened = open_page((report / "chapter-4.html").as_uri())
+    page = opened.page
+    found = page.locator(".findings")
+    assert "100 % comes first with" in found.inner_text()
+    first_figure = page.locator("main section").first
+    above, below = found.bounding_box(), first_figure.bounding_box()
+    assert above is not None
+    assert below is not None
+    assert above["y"] < below["y"]
+    found.locator("a", has_text="Accuracy rises").click()
+    page.locator("#accuracy-rises .claim").wait_for()
+    assert page.url.endswith("index.html#accuracy-rises")
+    assert opened.is_quiet()
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_a_choice_opens_its_run(open_page: Opener, report: Path, width: int) -> None:
+    opened = open_page((report / "index.html").as_uri(), width)
+    page = opened.page
+    table = page.locator("table.stacks")
+    row = table.locator("tbody tr").first
+    technique = row.locator(".open-run").inner_text()
+    row.locator(".open-run").click()
+    dialog = page.locator("#run")
+    dialog.locator("h2", has_text=technique.split(",")[0]).wait_for()
+    shown = dialog.locator(".figure-value").first.inner_text().split()[0]
+    assert shown in row.text_content(timeout=5000)  # type: ignore[operator]
+    page.keyboard.press("Escape")
+    if width > 1000:
+        table.locator("th", has_text="Bytes of a window").locator("button").click()
+        heading = table.locator("th", has_text="Bytes of a window")
+        assert heading.get_attribute("aria-sort") == "ascending"
+    assert opened.is_quiet()
+
+
 def test_tables_sort_by_click_and_by_keyboard(open_page: Opener, report: Path) -> None:
     opened = open_page((report / "chapter-4.html").as_uri())
     page = opened.page

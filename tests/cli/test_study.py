@@ -50,6 +50,10 @@ def test_check_run_again_show(run: Run, tmp_path: Path) -> None:
     assert reported.returncode == 0, reported.stderr
     assert "holds: Image bytes fall with the compression c." in reported.stdout
     assert (tmp_path / "pages" / "index.html").is_file()
+    assert list((tmp_path / "pages" / "pictures").rglob("*.jpg"))
+    words = ("report", "study", "--out", "bare", "--data", "data", "--no-pictures")
+    assert run(*words).returncode == 0
+    assert not (tmp_path / "bare" / "pictures").exists()
 
     again = json.loads(run("run", "plan.toml", "--out", "study", "--json").stdout)
     assert (again["n_ok"], again["n_kept"]) == (0, 6)

@@ -1,4 +1,7 @@
-"""A process that runs a tiny study, to be killed: ``study_process.py DATA FOLDER [CACHE]``."""
+"""A process that runs a tiny study, to be killed: ``study_process.py DATA FOLDER [CACHE]``.
+
+With two workers that hang in place of none, to be left alone: ``study_process.py DATA hang``.
+"""
 
 import sys
 from pathlib import Path
@@ -13,8 +16,15 @@ PLAN = {
 }
 
 
+HANGING = {**PLAN, "techniques": '[{ name = "tiny", parameters = { trouble = "hang" } }]'}
+
+
 def main() -> None:
     data, folder = map(Path, sys.argv[1:3])
+    if sys.argv[2] == "hang":
+        with tiny_registered():
+            run_study(tiny_plan(data, **HANGING), data / "study", workers=2)
+        return
     cache = Path(sys.argv[3]) if len(sys.argv) > 3 else None
     with tiny_registered():
         plan = tiny_plan(data, **PLAN)

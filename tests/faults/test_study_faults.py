@@ -17,6 +17,7 @@ import pytest
 from tests.faults.study_process import PLAN
 from tests.unit.studies.tiny import (
     DEATH_NOTE,
+    HANG_S,
     ROOT,
     hashes,
     tiny_plan,
@@ -303,3 +304,29 @@ def test_left_overs_of_the_living_stay(tmp_path: Path) -> None:
     assert mine.exists()
     assert elsewhere.exists()
     assert not dead.exists()
+
+
+def test_workers_end_with_the_process_they_serve(data: Path, tmp_path: Path) -> None:
+    note = tmp_path / "hung"
+    # Workers write to where the errors of their coordinator go: its end is the end of them all.
+    coordinator = subprocess.Popen(
+        [sys.executable, "-m", "tests.faults.study_process", str(data), "hang"],
+        env={**os.environ, "PYTHONPATH": str(ROOT), DEATH_NOTE: str(note)},
+        cwd=ROOT,
+        stderr=subprocess.PIPE,
+    )
+    try:
+        wait_for(lambda: len(list(tmp_path.glob("hung *"))) == 2, seconds=60)
+    finally:
+        coordinator.kill()
+    began = time.monotonic()
+    coordinator.communicate(timeout=HANG_S / 2)
+    assert time.monotonic() - began < HANG_S / 2
+    assert coordinator.returncode == -signal.SIGKILL
+
+
+def wait_for(happened: Callable[[], bool], *, seconds: float) -> None:
+    until = time.monotonic() + seconds
+    while not happened():
+        assert time.monotonic() < until, "it did not happen in time"
+        time.sleep(0.05)

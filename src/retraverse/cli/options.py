@@ -28,6 +28,7 @@ __all__ = [
     "RuntimeName",
     "SequenceLengthText",
     "Settings",
+    "ShowPictures",
     "SkipBad",
     "TechniqueName",
     "Threshold",
@@ -83,6 +84,12 @@ Threshold = Annotated[
 Every = Annotated[int, typer.Option("--every", min=1, help="Take every N-th frame only.")]
 SkipBad = Annotated[
     bool, typer.Option("--skip-bad", help="Leave out pictures that cannot be read, and say so.")
+]
+ShowPictures = Annotated[
+    bool,
+    typer.Option(
+        help="Show the datasets' pictures in the report; without them it can be passed on."
+    ),
 ]
 JsonOutput = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 TruthPath = Annotated[

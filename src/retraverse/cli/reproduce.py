@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from retraverse.cli.options import JsonOutput
+from retraverse.cli.options import JsonOutput, ShowPictures
 from retraverse.cli.output import print_json, progress, remark
 from retraverse.cli.study import print_expectations
 
@@ -37,6 +37,7 @@ def reproduce(
         str | None,
         typer.Option("--cluster", help="Dask: tcp://HOST:PORT, tls://HOST:PORT, or local:WORKERS."),
     ] = None,
+    pictures: ShowPictures = True,
     json_output: JsonOutput = False,
 ) -> None:
     """Run the thesis' studies on your data; what is done is kept, so run it again after a break."""
@@ -55,7 +56,7 @@ def reproduce(
             cache=out / "cache",
             progress=progress(),
         )
-    index = _report(out, data)
+    index = _report(out, data if pictures else None)
     if json_output:
         print_json(_summary(results, index))
         return
@@ -72,7 +73,7 @@ def _folder(plan: "StudyPlan") -> str:
     return plan.name.replace(",", "").replace(" ", "-")
 
 
-def _report(out: Path, data: Path) -> Path:
+def _report(out: Path, data: Path | None) -> Path:
     from retraverse.cli.view import pictures_of
     from retraverse.reports import write_study_report
 

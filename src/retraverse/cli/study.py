@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from retraverse.cli.options import JsonOutput
+from retraverse.cli.options import JsonOutput, ShowPictures
 from retraverse.cli.output import print_json, print_table, progress, remark
 
 if TYPE_CHECKING:
@@ -138,6 +138,7 @@ def report(
     published: Annotated[
         bool, typer.Option(help="Print the thesis' values beside ours where they apply.")
     ] = True,
+    pictures: ShowPictures = True,
 ) -> None:
     """Write a study's report: a folder of pages that open from disk."""
     from retraverse.cli.view import pictures_of
@@ -147,7 +148,7 @@ def report(
         study,
         out,
         published=published,
-        pictures=pictures_of(data),
+        pictures=pictures_of(data) if pictures else None,
         cache=cache,
         progress=progress(),
     )

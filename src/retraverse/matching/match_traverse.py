@@ -5,6 +5,7 @@ with dynamic lengths, and with the region of interest of a window's first frame.
 matchers take the whole matrix of single frames, each under its own region of interest.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -34,7 +35,7 @@ from retraverse.techniques import Descriptions, RegionalTechnique
 from retraverse.techniques.convsequential import ConvSequentialParameters
 from retraverse.types import BoolArray, FloatArray, IntArray, Progress, no_progress
 
-__all__ = ["SequenceLength", "match", "match_similarity", "query_windows"]
+__all__ = ["SequenceLength", "match", "match_similarity", "match_windows", "query_windows"]
 
 SequenceLength = int | Literal["dynamic"]
 """Frames in a window: 1 for single frames, K, or each window its own."""
@@ -89,25 +90,68 @@ def match(
     if sequence_length == "dynamic":
         queries = ensure_entropy(queries, query, progress=progress)
     if chosen.name == "mean":
-        matches = _match_mean(queries, route, sequence_length, progress)
+        lengths = query_windows(queries, route, sequence_length)
+        (matches,) = match_windows(queries, route, [lengths], progress=progress)
     else:
         matches = _match_matrix(queries, route, sequence_length, chosen, progress)
     return matches if threshold is None else matches.refuse_below(threshold)
 
 
-def _match_mean(
-    queries: Descriptions, route: RouteMap, sequence_length: SequenceLength, progress: Progress
-) -> Matches:
-    """Return the mean's answers, block by block and with windows of any length."""
-    lengths = query_windows(queries, route, sequence_length)
-    technique = route.technique
-    if _takes_first_roi(route) and lengths.max(initial=1) > 1:
+def match_windows(
+    queries: Descriptions,
+    route: RouteMap,
+    choices: Sequence[IntArray],
+    *,
+    scores: FloatArray | None = None,
+    progress: Progress = no_progress,
+) -> tuple[Matches, ...]:
+    """Return the mean's answers for several choices of windows, as `match` gives them one by one.
+
+    Under the region of interest of a window's first frame all choices are answered in one pass, in
+    which every pair of frames is compared once; otherwise `scores` serve all of them, or each
+    choice compares anew, block by block.
+
+    Parameters
+    ----------
+    queries : Descriptions
+        By the map's technique.
+    route : RouteMap
+    choices : sequence of int64 arrays, each of a shape (W,)
+        Lengths of the windows that start at query 0, 1, ... W-1: see `query_windows`.
+    scores : float32 array, shape (Q, R), optional
+        The similarity matrix, where it is there: what it answers is not compared again.
+    progress : Progress
+        Watches the comparing.
+
+    Returns
+    -------
+    matches : tuple of Matches
+        One for every choice.
+    """
+    found: dict[int, tuple[IntArray, FloatArray]] = {}
+    for number, lengths in enumerate(choices):
+        if not _needs_first_roi(route, lengths):
+            blocks = [] if scores is None else [(0, scores)]
+            rows = blocks or similarity_blocks(queries, route, progress=progress)
+            found[number] = match_diagonals(rows, lengths)
+    together = [number for number in range(len(choices)) if number not in found]
+    if together:
+        technique, chosen = route.technique, [choices[number] for number in together]
         assert isinstance(technique, RegionalTechnique)
-        found = match_first_roi(technique, queries, route, lengths, progress=progress)
-    else:
-        found = match_diagonals(similarity_blocks(queries, route, progress=progress), lengths)
-    matches = _matches(*found, lengths, len(queries), len(route))
-    return matches.refuse(~_any_in_window(has_descriptor(queries), lengths))
+        passed = match_first_roi(technique, queries, route, chosen, progress=progress)
+        found.update(zip(together, passed, strict=True))
+    described = has_descriptor(queries)
+    return tuple(
+        _matches(*found[number], lengths, len(queries), len(route)).refuse(
+            ~_any_in_window(described, lengths)
+        )
+        for number, lengths in enumerate(choices)
+    )
+
+
+def _needs_first_roi(route: RouteMap, lengths: IntArray) -> bool:
+    """Return whether a matrix, in which each frame has its own ROI, will not do."""
+    return _takes_first_roi(route) and bool(lengths.max(initial=1) > 1)
 
 
 def _match_matrix(

@@ -9,10 +9,11 @@ lead there, both in one pass over the query and in memory that does not grow wit
 `match_first_roi`
     Every pair is scored under the region of interest of its *window's first* frame, as the
     authors' program does, so a pair has one score per window. The regions' best matches do not
-    depend on the ROI, so all windows that share a frame are scored together.
+    depend on the ROI, so all windows that share a frame are scored together. A shorter window
+    is the beginning of a longer one, so one pass serves windows of many lengths.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -64,33 +65,73 @@ def match_first_roi(
     technique: RegionalTechnique,
     queries: Descriptions,
     route: RouteMap,
-    lengths: IntArray,
+    choices: Sequence[IntArray],
     *,
     progress: Progress = no_progress,
-) -> tuple[IntArray, FloatArray]:
+) -> list[tuple[IntArray, FloatArray]]:
     """Return the best reference and its score for every window, each under its first frame's ROI.
 
-    Parameters and results are those of `match_diagonals`, with descriptions for blocks.
+    Parameters
+    ----------
+    technique : RegionalTechnique
+    queries : Descriptions
+    route : RouteMap
+    choices : sequence of int64 arrays, each of a shape (W,)
+        Lengths, as `match_diagonals` takes them; several choices of windows cost little more than
+        their longest.
+    progress : Progress
+        Watches the query frames.
+
+    Returns
+    -------
+    found : list of (int64 array, float32 array), each of shape (W,)
+        For every choice what `match_diagonals` returns.
+
+    Notes
+    -----
+    Memory beside the descriptions: the sums of the windows that are open, K R numbers for a
+    longest window of K frames, whatever the query's length. The last digit of a score may depend on
+    the other choices: the regions of all open windows are added up in one order.
     """
-    weights = technique.region_weights(queries[: len(lengths)])
-    reference = np.empty(len(lengths), np.int64)
-    score = np.empty(len(lengths), np.float32)
+    longest = _longest(choices)
+    weights = technique.region_weights(queries[: len(longest)])
+    found = [(np.empty(len(one), np.int64), np.empty(len(one), np.float32)) for one in choices]
+    asked = _asked(choices)
     sums: dict[int, Array] = {}
-    n_frames = int((np.arange(len(lengths)) + lengths).max(initial=0))
-    frames = progress(range(n_frames), total=n_frames, label="matching")
-    for frame in frames:
-        if frame < len(lengths):
+    n_frames = int((np.arange(len(longest)) + longest).max(initial=0))
+    for frame in progress(range(n_frames), total=n_frames, label="matching"):
+        if frame < len(longest):
             sums[frame] = np.zeros(len(route))
         windows = sorted(sums)
         pairs = _frame_scores(technique, queries.descriptor[frame], route, weights[windows])
         for window, pair_scores in zip(windows, pairs, strict=True):
             offset = frame - window
             # The window's pair number `offset` puts reference r + offset beside start r.
-            sums[window][: len(route) - offset] += pair_scores[offset:]
-            if offset + 1 == lengths[window]:
-                means = sums.pop(window)[: len(route) - offset] / lengths[window]
-                reference[window], score[window] = _best(means)
-    return reference, score
+            starts = sums[window][: len(route) - offset]
+            starts += pair_scores[offset:]
+            for choice in asked.get((window, offset + 1), ()):
+                reference, score = found[choice]
+                reference[window], score[window] = _best(starts / (offset + 1))
+            if offset + 1 == longest[window]:
+                del sums[window]
+    return found
+
+
+def _longest(choices: Sequence[IntArray]) -> IntArray:
+    """Return int64 (W,): the most frames that any choice gives the window at query 0, 1, ..."""
+    longest = np.zeros(max(map(len, choices), default=0), np.int64)
+    for lengths in choices:
+        longest[: len(lengths)] = np.maximum(longest[: len(lengths)], lengths)
+    return longest
+
+
+def _asked(choices: Sequence[IntArray]) -> dict[tuple[int, int], list[int]]:
+    """Return the choices that have a window of this (start, length)."""
+    asked: dict[tuple[int, int], list[int]] = {}
+    for choice, lengths in enumerate(choices):
+        for window, length in enumerate(lengths.tolist()):
+            asked.setdefault((window, length), []).append(choice)
+    return asked
 
 
 def _frame_scores(

@@ -1,18 +1,23 @@
 """A study's tasks on a Dask cluster: other processes, other machines (the extra ``cluster``).
 
-The cluster's workers read the pictures under the same paths as this process does; descriptions
-and matrices travel with the tasks, and only this process writes. Records are those of local
-workers, hash for hash.
+The cluster's workers read the pictures under the same paths as this process does. Those that see
+the study's cache too read descriptions and matrices there; to others they are sent along. Only
+this process writes. Records are those of local workers, hash for hash.
 """
 
 import importlib
+import itertools
+import os
 import secrets
+import socket
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from retraverse._version import __version__
 from retraverse.errors import ConfigError, InputError, MissingExtraError
+from retraverse.studies.match_task import MatchTask, in_hand, is_readable
 from retraverse.studies.workers import (
     MOST_ATTEMPTS,
     ONE_THREAD,
@@ -22,10 +27,14 @@ from retraverse.studies.workers import (
     run_task,
 )
 
-__all__ = ["DaskPool", "check_address"]
+__all__ = ["DaskPool", "UnseenFilesError", "check_address"]
 
 CONNECT_S = 20
 WORKERS_S = 60
+
+
+class UnseenFilesError(Exception):
+    """A worker of the cluster cannot read the study's cache, though others can."""
 
 
 def check_address(address: str) -> int | None:
@@ -55,6 +64,8 @@ class DaskPool:
         ``tcp://…`` or ``tls://…`` of a scheduler, or ``local:4`` for a cluster of its own.
     modules : sequence of str
         Python modules every worker imports first.
+    cache : Path, optional
+        The study's cache. Workers that can read it are told paths; to others all is sent.
 
     Raises
     ------
@@ -64,9 +75,9 @@ class DaskPool:
         If nothing answers at the address, or no worker comes.
     """
 
-    sees_files = False
-
-    def __init__(self, address: str, modules: Sequence[str] = ()) -> None:
+    def __init__(
+        self, address: str, modules: Sequence[str] = (), cache: Path | None = None
+    ) -> None:
         n_local = check_address(address)
         distributed = _distributed()
         self._modules = tuple(modules)
@@ -89,6 +100,8 @@ class DaskPool:
         self._coming = distributed.as_completed()
         self._tasks: dict[str, tuple[int, Task, int]] = {}
         self._name = secrets.token_hex(4)
+        self._serial = itertools.count()
+        self.sees_files = cache is not None and self._workers_see(cache)
 
     @property
     def capacity(self) -> int:
@@ -108,6 +121,11 @@ class DaskPool:
                 outcome: Outcome = future.result()
                 return Done(number, outcome)
             error = future.exception() if future.status == "error" else None
+            if type(error).__name__ == "UnseenFilesError" and isinstance(task, MatchTask):
+                # It joined after the others were asked.
+                self.sees_files = False
+                self._send(number, in_hand(task), attempt)
+                continue
             if error is not None and type(error).__name__ != "KilledWorker":
                 # Tasks do not raise: this is the cluster's, not the study's.
                 raise InputError(f"cluster: a task could not be run: {error}") from error
@@ -121,8 +139,29 @@ class DaskPool:
         if self._own is not None:
             self._own.close()
 
+    def _workers_see(self, folder: Path) -> bool:
+        """Return whether all workers can read what this process writes into a folder.
+
+        From those on this machine outcomes then come without a detour by the scheduler.
+        """
+        text = secrets.token_hex(16)
+        note = folder / f".{socket.gethostname()}-{os.getpid()}-{text}.tmp"
+        try:
+            note.parent.mkdir(parents=True, exist_ok=True)
+            note.write_text(text)
+            hosts = set(self._client.run(_host_that_reads, str(note), text).values())
+        except Exception:  # A worker of another version, one just lost: then all is sent along.
+            return False
+        finally:
+            note.unlink(missing_ok=True)
+        self._client.direct_to_workers = hosts == {socket.gethostname()} or None
+        return bool(hosts) and "" not in hosts
+
     def _send(self, number: int, task: Task, attempt: int) -> None:
-        key = f"retraverse-{self._name}-{number}-{attempt}"
+        # Dask foresees how long tasks take by the words at the front of their keys.
+        kind = "match" if isinstance(task, MatchTask) else "describe"
+        # A key of its own for every sending: by an old one Dask answers what it answered before.
+        key = f"retraverse-{kind}-{self._name}-{next(self._serial)}"
         self._tasks[key] = number, task, attempt
         future = self._client.submit(
             _run_remote, task, self._modules, __version__, key=key, pure=False
@@ -137,12 +176,24 @@ def _run_remote(task: Task, modules: tuple[str, ...], version: str) -> Outcome:
             f"this worker has retraverse {__version__}, the study runs with {version}; "
             "install the same version everywhere"
         )
+    if isinstance(task, MatchTask) and not is_readable(task):
+        raise UnseenFilesError(f"{socket.gethostname()} does not see the study's cache")
     import cv2
 
     cv2.setNumThreads(1)
+    # For workers that were started without it; what counts threads at its import is told too late.
+    os.environ.setdefault("RETRAVERSE_THREADS", "1")
     for module in modules:
         importlib.import_module(module)
     return run_task(task)
+
+
+def _host_that_reads(path: str, text: str) -> str:
+    """Return the name of this machine if it reads that text in that file, else nothing."""
+    try:
+        return socket.gethostname() if Path(path).read_text() == text else ""
+    except OSError:
+        return ""
 
 
 def _distributed() -> Any:

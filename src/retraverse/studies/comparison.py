@@ -34,7 +34,7 @@ from retraverse.studies.comparison_record import (
     Times,
     TraverseRecord,
 )
-from retraverse.techniques import Descriptions, Technique
+from retraverse.techniques import Descriptions, FingerprintedTechnique, Technique
 from retraverse.types import FloatArray, Progress, no_progress
 
 __all__ = ["ComparePlan", "compare"]
@@ -240,7 +240,13 @@ def _provenance(plan: ComparePlan) -> Provenance:
         opencv=cv2.__version__,
         machine=f"{platform.machine()}, {platform.system()}",
         seed=SEED,
+        weights=_weights(plan.technique),
     )
+
+
+def _weights(technique: Technique) -> str:
+    """Return the fingerprint of a technique's trained weights, "" if it has none."""
+    return technique.fingerprint() if isinstance(technique, FingerprintedTechnique) else ""
 
 
 def _matcher_text(matcher: str | Matcher) -> str:

@@ -115,6 +115,8 @@ class Provenance:
     """Processor and operating system."""
     seed: int
     """Seed of every random choice."""
+    weights: str = ""
+    """SHA-256 of the technique's trained weights, whatever they are called; "" if it has none."""
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ import numpy as np
 
 from retraverse.errors import InputError
 from retraverse.images import Frame, GreyPath
-from retraverse.images.pixels import Pixels
+from retraverse.images.pixels import ArrayPixels, Pixels
 from retraverse.images.worsen import Worsening, worsen_each
 from retraverse.studies.plan import TechniqueChoice
 from retraverse.techniques import Description, Descriptions, Technique
@@ -62,11 +62,6 @@ class DescribeTask:
     digests: tuple[bytes, ...]
     """SHA-256 of every frame's fingerprint, as the keys were made with."""
     wanted: tuple[Wanted, ...]
-
-    @property
-    def cost(self) -> int:
-        """About how long it takes, in pictures described."""
-        return len(self.frames) * len(self.wanted)
 
 
 @dataclass(frozen=True)
@@ -206,11 +201,11 @@ def _add_batch(
 
 def _worsen(frame: Frame, digest: bytes, ways: Sequence[Worsening]) -> list[_Picture]:
     """Return a frame made worse in all ways, if it still is the one the keys were made with."""
-    known = replace(frame, pixels=_Remembered(frame.pixels))
-    if hashlib.sha256(known.fingerprint()).digest() != digest:
+    read = _read_once(frame.pixels)
+    if hashlib.sha256(replace(frame, pixels=read).fingerprint()).digest() != digest:
         raise InputError(f"{frame.name} changed while the study ran; run it again")
     # From here on its digest stands for it: hashed once, not once for each c.
-    known = replace(frame, pixels=_Remembered(known.pixels, digest))
+    known = replace(frame, pixels=_identified(read, digest))
     return [
         _Picture(
             replace(worse.frame, pixels=_Remembered(worse.frame.pixels)),
@@ -219,6 +214,32 @@ def _worsen(frame: Frame, digest: bytes, ways: Sequence[Worsening]) -> list[_Pic
         )
         for worse in worsen_each(known, ways)
     ]
+
+
+def _read_once(pixels: Pixels) -> Pixels:
+    """Return the same pixels, of which nothing is read twice."""
+    if isinstance(pixels, ArrayPixels):
+        # An array stays one: only so can it be told from a colour picture.
+        return replace(pixels, items=(pixels.items[pixels.position],), position=0)
+    return _Remembered(pixels)
+
+
+def _identified(pixels: Pixels, identity: bytes) -> Pixels:
+    """Return the same pixels with a fingerprint that costs nothing."""
+    if isinstance(pixels, ArrayPixels):
+        return _KnownArray(pixels.items, pixels.position, pixels.colour_order, identity)
+    return _Remembered(pixels, identity)
+
+
+@dataclass(frozen=True, slots=True)
+class _KnownArray(ArrayPixels):
+    """An array that was hashed before."""
+
+    identity: bytes
+
+    def fingerprint(self) -> bytes:
+        """Return bytes that differ where the pixels do."""
+        return self.identity
 
 
 class _Remembered:

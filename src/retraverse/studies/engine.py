@@ -12,7 +12,6 @@ killed study starts again with what was not done.
 
 import itertools
 import time
-from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -29,6 +28,7 @@ from retraverse.studies.plan_checks import PlanError, plan_problems
 from retraverse.studies.records import RunRecord
 from retraverse.studies.run_provenance import RunProvenance
 from retraverse.studies.runs import Job
+from retraverse.studies.schedule import Schedule
 from retraverse.studies.study_folder import StudyFolder
 from retraverse.studies.work import Work, plan_work, wanted_entries
 from retraverse.studies.workers import InlinePool, Pool, ProcessPool, Task, lost_task
@@ -113,7 +113,8 @@ def run_study(
         raise PlanError(plan.name, problems)
     with StudyFolder.opened(Path(folder)) as study:
         study.write_plan(plan.text)
-        store = StudyCache(Path(cache) if cache is not None else study.cache)
+        # Absolute: workers of a cluster may run in another folder.
+        store = StudyCache((Path(cache) if cache is not None else study.cache).absolute())
         work = plan_work(plan, store, study, progress)
         run = _Run(study, store, work)
         run.do(plan, available_cores() if workers is None else workers, cluster, progress)
@@ -140,11 +141,7 @@ class _Run:
         self._store = store
         self._work = work
         self._errors: dict[str, str] = {}
-        self._waiting_for = [set(needs) for needs in work.needs]
-        self._jobs_of: dict[int, list[int]] = {}
-        for job, needs in enumerate(work.needs):
-            for task in needs:
-                self._jobs_of.setdefault(task, []).append(job)
+        self._schedule = Schedule(work)
         self._provenance = RunProvenance()
         self._pictures: dict[tuple[int, str, bool], _Pictures] = {}
         self._flushed = time.monotonic()
@@ -153,7 +150,7 @@ class _Run:
         """Do all the work."""
         self._keep(self._work.records)
         if self._work.jobs:
-            pool = _pool(plan, self._work, workers, cluster)
+            pool = _pool(plan, self._work, workers, cluster, self._store.folder)
             try:
                 self._do_tasks(pool, plan.name, progress)
             finally:
@@ -161,24 +158,21 @@ class _Run:
         self._study.flush()
 
     def _do_tasks(self, pool: Pool, name: str, progress: Progress) -> None:
-        n_jobs, costs = len(self._work.jobs), [task.cost for task in self._work.tasks]
-        total = sum(costs) + sum(_job_cost(job) for job in self._work.jobs)
+        n_jobs, total = len(self._work.jobs), self._schedule.total
         steps = itertools.chain.from_iterable(map(range, self._costs_done(pool)))
         for _ in progress(steps, total=total, label=f"study {name}: {n_jobs} pairs of drives"):
             pass
 
     def _costs_done(self, pool: Pool) -> Iterator[int]:
         """Run all tasks; yield the cost of each as it is done."""
-        describing = deque(range(len(self._work.tasks)))
-        matching = deque(job for job, needs in enumerate(self._waiting_for) if not needs)
-        # Numbers of describing tasks count from 0, of jobs from -1 downwards.
+        schedule = self._schedule
         running: dict[int, Task] = {}
-        while describing or matching or running:
-            while (describing or matching) and len(running) < pool.capacity:
-                number = -1 - matching.popleft() if matching else describing.popleft()
+        while schedule or running:
+            while schedule and len(running) < pool.capacity:
+                number = schedule.next()
                 task = self._task(number, pool.sees_files)
                 if task is None:
-                    yield _job_cost(self._work.jobs[-1 - number])
+                    yield schedule.cost(number)
                 else:
                     running[number] = task
                     pool.submit(number, task)
@@ -187,18 +181,17 @@ class _Run:
                 begun = running.pop(done.number)
                 outcome = lost_task(begun) if done.outcome is None else done.outcome
                 if isinstance(outcome, Described):
-                    matching.extend(self._take_described(done.number, outcome))
-                    yield begun.cost
+                    self._take_described(done.number, outcome)
                 else:
                     self._take_matched(-1 - done.number, outcome)
-                    yield _job_cost(self._work.jobs[-1 - done.number])
+                yield schedule.cost(done.number)
 
     def _task(self, number: int, by_path: bool) -> Task | None:
         """Return a task by its number; None for a job whose records are written already."""
         return self._work.tasks[number] if number >= 0 else self._match_task(-1 - number, by_path)
 
-    def _take_described(self, number: int, outcome: Described) -> list[int]:
-        """Keep what was described; return the jobs that can now be matched."""
+    def _take_described(self, number: int, outcome: Described) -> None:
+        """Keep what was described."""
         for key, arrays in outcome.entries.items():
             self._store.save(key, arrays)
         self._errors.update(outcome.errors)
@@ -206,12 +199,7 @@ class _Run:
         self.n_described += len(task.frames) * sum(
             wanted.technique is not None and wanted.key in outcome.entries for wanted in task.wanted
         )
-        ready = []
-        for job in self._jobs_of[number]:
-            self._waiting_for[job].discard(number)
-            if not self._waiting_for[job]:
-                ready.append(job)
-        return ready
+        self._schedule.described(number)
 
     def _take_matched(self, number: int, outcome: Matched) -> None:
         if outcome.matrix is not None:
@@ -310,16 +298,12 @@ class _Pictures:
         )
 
 
-def _pool(plan: StudyPlan, work: Work, workers: int, cluster: str | None) -> Pool:
+def _pool(plan: StudyPlan, work: Work, workers: int, cluster: str | None, cache: Path) -> Pool:
     if cluster is not None:
         from retraverse.studies.cluster import DaskPool
 
-        return DaskPool(cluster, plan.modules)
+        return DaskPool(cluster, plan.modules, cache)
     if work.is_quick or workers == 0:
         return InlinePool()
     n_tasks = len(work.tasks) + len(work.jobs)
     return ProcessPool(min(workers, n_tasks), plan.modules)
-
-
-def _job_cost(job: Job) -> int:
-    return 1 + len(job.runs) // 4

@@ -13,16 +13,13 @@ from pathlib import Path
 from retraverse.studies.cache import StudyCache
 from retraverse.studies.describe_task import DescribeTask, describe_task, made_technique
 from retraverse.studies.plan import StudyPlan
+from retraverse.studies.schedule import match_s
 from retraverse.studies.work import Work, plan_work
 from retraverse.types import Progress, no_progress
 
 __all__ = ["Estimate", "estimate_study"]
 
-RUN_S = 0.003
-"""Matching and judging one short run, and writing its record."""
 RECORD_BYTES = 1500
-OPERATIONS_S = 2e9
-"""Multiplications of a similarity matrix a second."""
 START_S = 1.0
 
 
@@ -64,13 +61,12 @@ def estimate_study(
     place = Path(folder)
     work = plan_work(plan, StudyCache(Path(cache) if cache else place / "cache"), None, progress)
     seconds, problems = _try_tasks(work, progress)
-    per_run = RUN_S * sum(len(job.runs) for job in work.jobs) + _compare_s(work)
     refused = (record.error for record in work.records)
     return Estimate(
         n_runs=work.n_runs,
         n_kept=work.n_kept,
         n_pictures=sum(_n_descriptions(task) for task in work.tasks),
-        seconds=START_S + (seconds + per_run) / max(1, workers),
+        seconds=START_S + (seconds + _match_s(work)) / max(1, workers),
         n_bytes=_disk(work),
         problems=tuple(dict.fromkeys([*refused, *problems])),
     )
@@ -112,14 +108,15 @@ def _n_descriptions(task: DescribeTask) -> int:
     return len(task.frames) * sum(wanted.technique is not None for wanted in task.wanted)
 
 
-def _compare_s(work: Work) -> float:
+def _match_s(work: Work) -> float:
     return math.fsum(
-        len(job.query.traverse)
-        * len(job.reference.traverse)
-        * made_technique(job.technique).layout.dimension
-        / OPERATIONS_S
+        match_s(
+            job.technique,
+            job.runs,
+            (len(job.query.traverse), len(job.reference.traverse)),
+            has_matrix=has_matrix,
+        )
         for job, has_matrix in zip(work.jobs, work.matrices, strict=True)
-        if not has_matrix
     )
 
 

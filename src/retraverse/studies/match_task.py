@@ -2,10 +2,10 @@
 
 The similarity matrix is made once, or comes from the cache; every fixed length and every matcher
 reads it. Windows of dynamic length, and those under the region of interest of their first frame,
-need the descriptions too.
+need the descriptions too; they are answered together (`window_answers`).
 
 Times: t_m of a window of K frames is K rows of similarity and the matching of one window: what an
-answer costs that starts from nothing (equations 4.7 and 6.3).
+answer costs that starts from nothing (equations 4.7 and 6.3), whatever the task's runs share.
 """
 
 import math
@@ -27,7 +27,6 @@ from retraverse.matching import (
     Matcher,
     Matches,
     SequenceLength,
-    match,
     match_similarity,
     similarity,
 )
@@ -39,6 +38,7 @@ from retraverse.studies.cache import CacheEntry
 from retraverse.studies.describe_task import TIMES, made_technique, one_line_reason
 from retraverse.studies.plan import MatcherChoice, TechniqueChoice
 from retraverse.studies.records import RunRecord, Status
+from retraverse.studies.window_answers import Answers, answer_windows, timed_answers
 from retraverse.techniques import Descriptions, Technique
 from retraverse.types import Array, FloatArray
 
@@ -49,6 +49,8 @@ __all__ = [
     "RunSpec",
     "Source",
     "failed_runs",
+    "in_hand",
+    "is_readable",
     "match_task",
     "needs_descriptions",
 ]
@@ -104,11 +106,6 @@ class MatchTask:
     query_entropy: tuple[float, ...] = ()
     """Entropy of every query picture, for dynamic lengths; empty where none asks for it."""
 
-    @property
-    def cost(self) -> int:
-        """About how long it takes, in pictures described."""
-        return 1 + len(self.runs) // 4
-
 
 @dataclass(frozen=True)
 class Matched:
@@ -117,6 +114,21 @@ class Matched:
     records: tuple[RunRecord, ...]
     matrix: Mapping[str, Array] | None
     """The cache entry of the matrix, if it was made here."""
+
+
+def is_readable(task: MatchTask) -> bool:
+    """Return whether this process can read all that the task finds by path."""
+    sources = (task.matrix, *task.query, *task.reference)
+    return all(source.path.is_file() for source in sources if isinstance(source, CacheEntry))
+
+
+def in_hand(task: MatchTask) -> MatchTask:
+    """Return the task with everything sent along, for who does not see our files."""
+    query, reference = (
+        tuple(InHand(source.load()) for source in side) for side in (task.query, task.reference)
+    )
+    matrix = None if task.matrix is None else InHand(task.matrix.load())
+    return replace(task, matrix=matrix, query=query, reference=reference)
 
 
 def needs_descriptions(technique: TechniqueChoice, runs: Sequence[RunSpec]) -> bool:
@@ -148,6 +160,7 @@ class _Pair:
         self.made: Mapping[str, Array] | None = None
         self._route: RouteMap | None = None
         self._queries: Descriptions | None = None
+        self._answers: dict[SequenceLength, Answers | Exception] | None = None
         entry = self._make() if task.matrix is None else task.matrix.load()
         self.scores: FloatArray = entry["similarity"]
         self.row_s = float(entry["row_s"])
@@ -172,6 +185,20 @@ class _Pair:
             self._route = _route(_gather(self.task.reference).descriptions, self.technique)
         return self._route
 
+    def answers(self, length: SequenceLength) -> Answers:
+        """Return the mean's answers by more than the matrix; all such lengths are found at once."""
+        if self._answers is None:
+            lengths = dict.fromkeys(
+                spec.sequence_length
+                for spec in self.task.runs
+                if _goes_beyond_matrix(self.technique, spec)
+            )
+            self._answers = answer_windows(self.queries, self.route, self.scores, lengths)
+        found = self._answers[length]
+        if isinstance(found, Exception):
+            raise found
+        return found
+
     def _make(self) -> Mapping[str, Array]:
         queries, route = self.queries, self.route
         if not getattr(self.technique, "compares_whole_drives", False):
@@ -191,14 +218,11 @@ class _Pair:
 
 
 def _run(pair: _Pair, spec: RunSpec) -> RunRecord:
-    began = time.perf_counter()
-    matches, whole = _match(pair, spec)
-    match_s = time.perf_counter() - began
+    answers = _answers(pair, spec)
+    matches = answers.matches
     evaluation = evaluate(matches, pair.task.truth, seed=spec.seed)
     length = evaluation.mean_sequence_length
-    # What `match` took beyond the matrix holds the similarity of all rows.
-    row_s = match_s / matches.n_queries if whole else pair.row_s
-    window_s = length * row_s + (0.0 if whole else match_s / max(1, len(matches)))
+    match_s = length * pair.row_s + answers.window_s
     return replace(
         _base(pair.task.base, spec),
         mean_sequence_length=length,
@@ -213,8 +237,8 @@ def _run(pair: _Pair, spec: RunSpec) -> RunRecord:
         ep=evaluation.ep,
         no_descriptor_share=pair.no_descriptor_share,
         encode_s=pair.encode_s,
-        match_s=window_s,
-        vpr_s=t_vpr(pair.encode_s, window_s, length) if length > 0 else math.nan,
+        match_s=match_s,
+        vpr_s=t_vpr(pair.encode_s, match_s, length) if length > 0 else math.nan,
         sequence_lengths=(
             tuple(matches.sequence_length.tolist()) if spec.sequence_length == "dynamic" else ()
         ),
@@ -225,24 +249,25 @@ def _run(pair: _Pair, spec: RunSpec) -> RunRecord:
     )
 
 
-def _match(pair: _Pair, spec: RunSpec) -> tuple[Matches, bool]:
-    """Return the answers, and whether similarities were computed for them, beside the matrix."""
+def _answers(pair: _Pair, spec: RunSpec) -> Answers:
     if _goes_beyond_matrix(pair.technique, spec):
-        chosen = _matcher(spec.matcher)
-        length = spec.sequence_length
-        return match(pair.queries, pair.route, sequence_length=length, matcher=chosen), True
+        return pair.answers(spec.sequence_length)
+    return timed_answers(lambda: _match_matrix(pair, spec))
+
+
+def _match_matrix(pair: _Pair, spec: RunSpec) -> Matches:
     length = int(spec.sequence_length)
     matches = match_similarity(pair.scores, sequence_length=length, matcher=_matcher(spec.matcher))
     if spec.matcher.name == "mean":
         # As `match` does: a window without any descriptor is answered "no match".
         nothing = np.convolve(~pair.no_descriptor, np.ones(length), "valid") == 0
         matches = matches.refuse(nothing)
-    return matches, False
+    return matches
 
 
 def _goes_beyond_matrix(technique: Technique, spec: RunSpec) -> bool:
     if spec.sequence_length == "dynamic":
-        return True
+        return True  # Plans ask for it by the mean only.
     follows_first = getattr(technique.parameters, "roi", "each") == "first"
     return follows_first and spec.matcher.name == "mean" and spec.sequence_length > 1
 

@@ -16,7 +16,7 @@ The keys (all but ``datasets`` and ``techniques`` may be left out)::
     [images]
     resize = [256]                     # side in pixels; 0 = as they are
     resizer = "opencv"                 # or "pillow"
-    encoders = [{ optimize = true }]
+    encoders = [{ optimize = true }, { tables = "tables.json" }]   # from the plan's folder
 
     [compression]
     levels = [0, 50, 80, 90, 95, 97, 99]   # "none" = pictures as they are
@@ -35,6 +35,7 @@ from typing import Any, cast, get_args
 
 from retraverse.datasets.known import Dataset, find_dataset, known_dataset, open_dataset
 from retraverse.errors import ConfigError, DataMissingError, InputError
+from retraverse.images import QuantisationTables
 from retraverse.images.jpeg import Encoder
 from retraverse.images.worsen import Resizer, Worsening
 from retraverse.matching import SequenceLength
@@ -49,6 +50,7 @@ from retraverse.studies.plan import (
 )
 from retraverse.studies.plan_checks import PlanError, plan_problems
 from retraverse.studies.table_reader import Table, TableReader
+from retraverse.studies.tables_file import load_tables, read_tables
 
 __all__ = ["PlanError", "load_plan", "read_plan"]
 
@@ -263,7 +265,7 @@ class _Reader(TableReader):
         images = self.value("images", self._table, dict, {})
         self.known_keys("images", images, ("resize", "resizer", "encoders"))
         encoders = [
-            self.attempt(partial(_encoder, value))
+            self.attempt(partial(_encoder, value, self._root))
             for value in self.listed("encoders", images, dict, [{}], "images")
         ]
         sizes = [size or None for size in self.listed("resize", images, int, [0], "images")]
@@ -336,27 +338,40 @@ def _settled(pair: PicturePair) -> PicturePair:
     return PicturePair(settle(pair.query), settle(pair.reference))
 
 
-def _encoder(table: Mapping[str, Any]) -> Encoder:
+def _encoder(table: Mapping[str, Any], root: Path) -> Encoder:
     """Return the encoder of a table of options."""
     known = [field.name for field in fields(Encoder)]
     for key in table:
         if key not in known:
             raise ConfigError(unknown_name("key in images.encoders", key, known))
+    tables = _tables(table["tables"], root) if "tables" in table else None
     flags = {key: value for key, value in table.items() if isinstance(value, bool)}
-    words = {key: value for key, value in table.items() if key not in flags}
+    words = {key: value for key, value in table.items() if key not in (*flags, "tables")}
     for key in flags:
         if key not in ("optimize", "progressive"):
             raise ConfigError(f"images.encoders: {key}: got {flags[key]}, expected a text")
     for key in words:
         if key in ("optimize", "progressive"):
             raise ConfigError(f"images.encoders: {key}: got {words[key]!r}, expected true or false")
-        if key == "tables":
-            raise ConfigError("images.encoders: tables are not read from plans yet")
     chosen: Encoder = read_parameters("images.encoders", Encoder, words)
     return replace(
         chosen,
         optimize=flags.get("optimize", chosen.optimize),
         progressive=flags.get("progressive", chosen.progressive),
+        tables=tables,
+    )
+
+
+def _tables(value: object, root: Path) -> QuantisationTables:
+    """Return the tables of a file's path, or those that are in the plan itself."""
+    where = "images.encoders: tables"
+    if isinstance(value, str):
+        return load_tables(root / value)
+    if isinstance(value, dict):
+        return read_tables(value, where)
+    raise ConfigError(
+        f"{where}: got {value!r}, expected the path of a JSON file, or a table with luminance "
+        "and chrominance"
     )
 
 

@@ -2,7 +2,8 @@
 
 A task is a plain value and its outcome is one too, whoever runs it; workers read pictures and
 write nothing. Each computes on one thread. A worker that dies (out of memory, killed) costs its
-task's time: another takes its place and the task is run again, up to `MOST_ATTEMPTS` times.
+task's time: another takes its place and the task is run again, up to `MOST_ATTEMPTS` times. When
+this process is killed its workers end too, in the middle of what they are at.
 """
 
 import logging
@@ -183,8 +184,9 @@ class ProcessPool:
     def _start(self) -> _Worker:
         ours, theirs = Pipe()
         with theirs:
+            numbers = map(str, (theirs.fileno(), os.getpid()))
             process = subprocess.Popen(
-                [sys.executable, "-m", "retraverse.studies.worker", str(theirs.fileno())],
+                [sys.executable, "-m", "retraverse.studies.worker", *numbers],
                 pass_fds=[theirs.fileno()],
                 env={**os.environ, **ONE_THREAD, "PYTHONPATH": os.pathsep.join(_search_path())},
                 stdin=subprocess.DEVNULL,

@@ -52,7 +52,7 @@ class RegionVladParameters(LearnedParameters):
     )
     vocabulary: str = parameter(
         "regionvlad-vocabulary",
-        "vocabulary of `retraverse train regionvlad`: a name in the store or the path of a .safetensors",
+        "vocabulary of `retraverse train regionvlad`: a stored name, or a path of a .safetensors",
         compared=False,
     )
     words: int = parameter(256, "words of the vocabulary, 2 to 4096")

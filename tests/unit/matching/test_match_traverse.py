@@ -1,6 +1,7 @@
 """What matching refuses, what it answers with "no match", and how many answers it gives."""
 
 import logging
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,6 +10,8 @@ from hypothesis import strategies as st
 
 import retraverse as rt
 from retraverse.errors import ConfigError, InputError, ShapeError
+from retraverse.matching import describe_query
+from retraverse.matching.match_traverse import match_windows, query_windows
 from retraverse.types import ImageArray
 
 
@@ -227,3 +230,54 @@ def test_scaling_scores_changes_no_answer(seed: int, scale: float) -> None:
     before = rt.match_similarity(scores, sequence_length=2)
     after = rt.match_similarity(scores * np.float32(2.0 ** round(scale)), sequence_length=2)
     np.testing.assert_array_equal(after.reference, before.reference)
+
+
+@pytest.mark.parametrize("roi", ["first", "each"])
+@pytest.mark.parametrize("with_scores", [True, False])
+def test_all_lengths_in_one_pass_as_one_by_one(roi: str, with_scores: bool) -> None:
+    random = np.random.default_rng(2)
+    noisy = [
+        np.clip(frame + random.normal(0, 40, frame.shape), 0, 255).astype(np.uint8)
+        for frame in street(14)
+    ]
+    # Dark and flat parts, so that regions of interest differ from frame to frame.
+    for index, frame in enumerate(noisy):
+        frame[:, : 4 * index] = 0
+    route = regional_route(street(17), roi=roi)
+    queries = describe_query(rt.open_traverse(noisy), route)
+    lengths: list[rt.SequenceLength] = [4, 1, "dynamic", 14, 2, 4]
+    choices = [query_windows(queries, route, length) for length in lengths]
+    scores = rt.similarity(queries, route) if with_scores else None
+    together = match_windows(queries, route, choices, scores=scores)
+    assert len(set(choices[2].tolist())) > 1, "dynamic windows of one length prove little"
+    for length, found in zip(lengths, together, strict=True):
+        alone = rt.match(queries, route, sequence_length=length)
+        np.testing.assert_array_equal(found.reference, alone.reference)
+        np.testing.assert_allclose(found.score, alone.score, rtol=1e-6)
+        np.testing.assert_array_equal(found.sequence_length, alone.sequence_length)
+    if roi == "first":
+        own = rt.match_similarity(rt.similarity(queries, route), sequence_length=4)
+        assert not np.allclose(own.score, together[0].score, rtol=1e-6), "the ROI tells nothing"
+
+
+def test_one_pass_scores_each_query_frame_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    route = regional_route(street(12), roi="first")
+    queries = describe_query(rt.open_traverse(street(12)), route)
+    choices = [query_windows(queries, route, length) for length in (2, 5, 9)]
+    seen: list[int] = []
+    regional: Any = type(route.technique)
+    plain = regional.weighted_similarity
+
+    def counted(self: Any, query: Any, references: Any, weights: Any) -> Any:
+        seen.append(len(weights))
+        return plain(self, query, references, weights)
+
+    monkeypatch.setattr(regional, "weighted_similarity", counted)
+    match_windows(queries, route, choices)
+    assert len(seen) == 12, "one call for each query frame"
+    assert max(seen) == 9, "no more windows are open than the longest has frames"
+
+
+def test_no_choice_no_answer(route: rt.RouteMap) -> None:
+    queries = describe_query(rt.open_traverse(street(3)), route)
+    assert match_windows(queries, route, []) == ()

@@ -244,3 +244,20 @@ def test_memory_of_planning_does_not_hold_pictures(data: Path, tmp_path: Path) -
     work = plan_work(tiny_plan(data), StudyCache(tmp_path / "cache"))
     assert all(frame.path is not None for task in work.tasks for frame in task.frames)
     assert [len(task.frames) for task in work.tasks] == [32, 8, 32, 8]
+
+
+def test_lengths_that_share_a_pass_cost_what_each_costs_alone(data: Path, tmp_path: Path) -> None:
+    plan = tiny_plan(
+        data,
+        techniques='[{ name = "convsequential", parameters = { resolution = 128 } }]',
+        sequence_lengths='[1, 3, 12, "dynamic"]',
+        compression='{ levels = ["none"] }',
+        modules="[]",
+    )
+    result = run_study(plan, tmp_path / "study", workers=0)
+    for record in read_study(tmp_path / "study"):
+        entry = StudyCache(tmp_path / "study" / "cache").load(record.similarity_key)
+        assert entry is not None
+        # K rows of similarity, and what adding them up took: no more than the whole study.
+        rows_s = record.mean_sequence_length * float(entry["row_s"])
+        assert rows_s < record.match_s < rows_s + result.seconds / record.n_windows

@@ -1,5 +1,6 @@
 """Plans: what they mean, and every way to get one wrong, all said at once."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -7,8 +8,11 @@ import pytest
 from tests.unit.studies.tiny import write_dataset
 
 from retraverse.errors import DataMissingError
+from retraverse.images import Encoder
+from retraverse.images.quantisation import STANDARD_TABLES
 from retraverse.studies.plan import StudyPlan, TechniqueChoice, compression_pairs
 from retraverse.studies.plan_file import PlanError, load_plan, read_plan
+from retraverse.studies.tables_file import save_tables
 
 
 @pytest.fixture(scope="module")
@@ -126,6 +130,14 @@ def test_datasets_of_ones_own(data: Path) -> None:
         ("images = { encoders = [{ optimise = true }] }", "did you mean 'optimize'?"),
         ('images = { encoders = [{ optimize = "yes" }] }', "expected true or false"),
         ('images = { encoders = [{ library = "jpegli" }] }', "'library': got 'jpegli'"),
+        ("images = { encoders = [{ library = true }] }", "library: got True, expected a text"),
+        ("images = { encoders = [{ tables = true }] }", "got True, expected the path of a JSON"),
+        ('images = { encoders = [{ tables = "no.json" }] }', "no.json: no such file"),
+        ("images = { encoders = [{ tables = { luma = [1] } }] }", "unknown key in images.encoders"),
+        (
+            "images = { encoders = [{ tables = { luminance = [1, 2], chrominance = [1] } }] }",
+            "images.encoders: tables: luminance table: got 2 steps, expected 64",
+        ),
         ("compression = { levels = [100] }", "compression.levels: got 100, expected whole"),
         ('compression = { pairs = ["all"] }', "unknown compression.pairs: got 'all'"),
         ("compression = { levels = [0], query = [0] }", "got levels and query"),
@@ -167,3 +179,42 @@ def test_files(data: Path, tmp_path: Path) -> None:
 def test_a_choice_without_a_size() -> None:
     choice = TechniqueChoice("hog", {"form": "chapter6"})
     assert choice.at(None) == choice
+
+
+def test_tables_of_a_file_and_of_the_plan_itself(data: Path, tmp_path: Path) -> None:
+    tuned = replace(STANDARD_TABLES, luminance=(7,) * 64, name="mine")
+    save_tables(tmp_path / "tables.json", tuned)
+    inline = f"{{ name = 'mine', luminance = {[7] * 64}, chrominance = {[*tuned.chrominance]} }}"
+    plan = plan_of(
+        data,
+        f"""
+        compression = {{ levels = [50] }}
+        images = {{ encoders = [{{ optimize = true, tables = "tables.json" }},
+                                {{ tables = {inline} }}] }}
+        """,
+        root=tmp_path,
+    )
+    encoders = [pair.query.encoder for pair in plan.pairs]
+    assert encoders == [Encoder(optimize=True, tables=tuned), Encoder(tables=tuned)]
+    assert encoders[0].label == f"pillow 4:2:0 optimize tables={tuned.label}"
+
+
+def test_a_tables_file_is_found_beside_the_plan(data: Path, tmp_path: Path) -> None:
+    save_tables(tmp_path / "own.json", STANDARD_TABLES)
+    lines = (
+        f'data = "{data}"',
+        'datasets = ["noise"]',
+        'techniques = ["hog"]',
+        "compression = { levels = [90] }",
+        'images = { encoders = [{ tables = "own.json" }] }',
+    )
+    (tmp_path / "plan.toml").write_text("\n".join(lines))
+    (pair,) = load_plan(tmp_path / "plan.toml").pairs
+    assert pair.query.encoder.tables == pair.reference.encoder.tables == STANDARD_TABLES
+
+
+def test_opencv_takes_no_tables(data: Path, tmp_path: Path) -> None:
+    save_tables(tmp_path / "own.json", STANDARD_TABLES)
+    lines = 'images = { encoders = [{ library = "opencv", tables = "own.json" }] }'
+    with pytest.raises(PlanError, match="opencv writes no tables"):
+        plan_of(data, lines, root=tmp_path)

@@ -3,6 +3,7 @@
 import os
 import signal
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -25,14 +26,15 @@ MODULE = "tests.unit.studies.register_tiny"
 MARK = 255
 """Grey level of the upper left pixel of the picture that the technique cannot stand."""
 DEATH_NOTE = "RETRAVERSE_TEST_DEATH_NOTE"
-"""Names a file; the worker that removes it dies."""
+"""Names a file; the worker that removes it dies. Those that hang leave one beside it."""
+HANG_S = 40
 
 
 @dataclass(frozen=True)
 class TinyParameters:
     """What goes wrong."""
 
-    trouble: Literal["none", "raise", "die", "always die"] = "none"
+    trouble: Literal["none", "raise", "die", "always die", "hang"] = "none"
     side: int = 6
 
 
@@ -70,6 +72,9 @@ class Tiny:
         if self.parameters.trouble == "raise" and image[0, 0] == MARK:
             raise ValueError("a picture\nit cannot stand")
         note = Path(os.environ.get(DEATH_NOTE, "none"))
+        if self.parameters.trouble == "hang":
+            note.with_name(f"{note.name} {os.getpid()}").touch()
+            time.sleep(HANG_S)
         if self.parameters.trouble == "die" and note.exists():
             note.unlink(missing_ok=True)
             os.kill(os.getpid(), signal.SIGKILL)

@@ -76,7 +76,9 @@ def test_a_place_that_cannot_be_written_is_said_first(weights: str, tmp_path: Pa
 def test_a_missing_vocabulary_says_how_to_build_one(weights: str) -> None:
     technique = region_vlad(weights)
     for ask in (technique.vocabulary, technique.fingerprint):
-        with pytest.raises(DataMissingError, match="retraverse train regionvlad DRIVE --out") as caught:
+        with pytest.raises(
+            DataMissingError, match="retraverse train regionvlad DRIVE --out"
+        ) as caught:
             ask()
         assert "\n" not in str(caught.value)
 

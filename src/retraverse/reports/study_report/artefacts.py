@@ -10,6 +10,7 @@ from functools import lru_cache
 
 from retraverse.reports.study_report.series import Series
 from retraverse.reports.svg import Plot
+from retraverse.studies.expectations import Expectation
 from retraverse.studies.records import RunRecord
 
 __all__ = [
@@ -18,6 +19,9 @@ __all__ = [
     "Cell",
     "Chapter",
     "Figure",
+    "Gallery",
+    "GalleryPicture",
+    "GalleryRow",
     "Line",
     "Panel",
     "Row",
@@ -41,6 +45,8 @@ class Cell:
     """The thesis' value, in the same unit."""
     note: str = ""
     """What stands beside the value in small type."""
+    is_best: bool = False
+    """Whether it is the best of its column."""
 
     @property
     def sort_key(self) -> str:
@@ -156,7 +162,38 @@ class Sheet:
     definitions: tuple[tuple[str, str], ...] = ()
 
 
-Artefact = Table | Figure | Sheet
+@dataclass(frozen=True)
+class GalleryPicture:
+    """One picture of a gallery."""
+
+    address: str
+    """Where it lies, "" if it cannot be had."""
+    alt: str
+    """What it shows, for those who do not see it."""
+    note: str
+    """What stands under it."""
+
+
+@dataclass(frozen=True)
+class GalleryRow:
+    """Pictures of one frame."""
+
+    title: str
+    pictures: tuple[GalleryPicture, ...]
+
+
+@dataclass(frozen=True)
+class Gallery:
+    """Pictures drawn over in several ways, a row for each frame."""
+
+    number: str
+    title: str
+    rows: tuple[GalleryRow, ...]
+    caption: str = ""
+    definitions: tuple[tuple[str, str], ...] = ()
+
+
+Artefact = Table | Figure | Sheet | Gallery
 
 
 @dataclass(frozen=True)
@@ -182,6 +219,10 @@ class Chapter:
     records: tuple[RunRecord, ...] = field(repr=False)
     absent: tuple[str, ...] = ()
     """Datasets of the thesis' chapter that are not here, as people write them."""
+    findings: tuple[tuple[str, str], ...] = ()
+    """(dataset, what was found there in a sentence or two)."""
+    expectations: tuple[Expectation, ...] = ()
+    """What was expected and could be tested on these records."""
 
     @property
     def artefacts(self) -> Sequence[Artefact]:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from retraverse.reports.study_report.artefacts import Artefact, Chapter, Figure, Table, slug
+from retraverse.reports.study_report.artefacts import Artefact, Cell, Chapter, Figure, Table, slug
 from retraverse.reports.study_report.page_files import put
 from retraverse.reports.svg import standalone
 
@@ -176,7 +176,7 @@ def table_latex(table: Table) -> str:
         "\\midrule",
     ]
     for row in table.rows:
-        texts = [_latex_cell(cell.text, cell.published) for cell in row.cells]
+        texts = [_latex_cell(cell) for cell in row.cells]
         if row.absent:
             span = len(table.head) - len(texts)
             texts.append(f"\\multicolumn{{{span}}}{{l}}{{{_escaped(row.absent)}}}")
@@ -184,8 +184,10 @@ def table_latex(table: Table) -> str:
     return "\n".join([*lines, "\\bottomrule", "\\end{tabular}", ""])
 
 
-def _latex_cell(text: str, published: str) -> str:
-    return _escaped(text) + (f" ({_escaped(published)})" if published else "")
+def _latex_cell(cell: Cell) -> str:
+    text = _escaped(cell.text)
+    shown = f"\\textbf{{{text}}}" if cell.is_best else text
+    return shown + (f" ({_escaped(cell.published)})" if cell.published else "")
 
 
 def _escaped(text: str) -> str:

@@ -1,27 +1,18 @@
 """The first page: what the study says, in a few rows."""
 
-import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from retraverse.reports.study_report.artefacts import Cell, Row, Table
 from retraverse.reports.study_report.words import (
     dataset_order,
     dataset_title,
-    meanings,
-    place_text,
-    size_text,
     tolerance_text,
 )
-from retraverse.reports.wording import NOTHING, count, percent, seconds
+from retraverse.reports.wording import count
 from retraverse.studies.records import RunRecord
-from retraverse.studies.selection import (
-    curves_of,
-    data_per_answer,
-    smallest_length,
-)
 
-__all__ = ["Trouble", "best_table", "datasets_table", "headline", "troubles"]
+__all__ = ["Trouble", "datasets_table", "headline", "troubles"]
 
 
 @dataclass(frozen=True)
@@ -32,67 +23,6 @@ class Trouble:
     """Technique and dataset."""
     reason: str
     n_runs: int
-
-
-def best_table(records: Sequence[RunRecord]) -> Table:
-    """Return, for every dataset, the runs to begin a choice with."""
-    curves = list(curves_of(records).values())
-    rows = []
-    for dataset in sorted(
-        {run.dataset for run in records if run.status == "ok"}, key=dataset_order
-    ):
-        here = [curve for curve in curves if curve[0].dataset == dataset]
-        full = [s.first for curve in here if (s := smallest_length(curve)) is not None]
-        singles = [curve[0] for curve in here if curve[0].sequence_length == "1"]
-        rows.append(
-            Row(
-                (
-                    Cell(dataset_title(dataset)),
-                    _best(singles, lambda run: -run.accuracy, lambda run: percent(run.accuracy)),
-                    _best(
-                        full,
-                        lambda run: float(run.sequence_length),
-                        lambda run: f"K = {run.sequence_length}",
-                    ),
-                    _best(full, data_per_answer, lambda run: size_text(data_per_answer(run))),
-                    _best(full, lambda run: run.vpr_s, lambda run: seconds(run.vpr_s)),
-                )
-            )
-        )
-    return Table(
-        "",
-        "Where to begin",
-        (
-            "Dataset",
-            "Most accurate single frame",
-            "100 % with the shortest sequence",
-            "100 % with the fewest bytes",
-            "100 % in the least time",
-        ),
-        tuple(rows),
-        "Each is the best of all runs of the study, which flatters it. A click opens the run. "
-        "Fewer than some twenty candidates left make 100 % easy: see the chapters' tables.",
-        meanings("accuracy", "smallest K", "d", "t_VPR"),
-    )
-
-
-def _best(
-    runs: Iterable[RunRecord],
-    cost: Callable[[RunRecord], float],
-    write: Callable[[RunRecord], str],
-) -> Cell:
-    """Return the run of least cost in words; NaN is no cost."""
-    known = [(cost(run), at, run) for at, run in enumerate(runs) if math.isfinite(cost(run))]
-    if not known:
-        return Cell(NOTHING, math.nan)
-    value, _, run = min(known)
-    return Cell(write(run), value, run, note=_mix(run))
-
-
-def _mix(run: RunRecord) -> str:
-    length = "" if run.sequence_length == "1" else f", K = {run.sequence_length}"
-    place = place_text(run)
-    return f"{run.technique}{length}" + ("" if place.startswith("pictures") else f", {place}")
 
 
 def datasets_table(records: Sequence[RunRecord], absent: Iterable[str]) -> Table:

@@ -219,7 +219,9 @@ def _set_scales(
         _plain_powers(axes.xaxis)
     elif all(float(x).is_integer() for line in lines for x in line.x):
         _whole_numbers(axes.xaxis)
-    if lines and all(float(y).is_integer() for line in lines for y in line.y):
+    if y_limits is not None and y_limits[1] > 100:
+        axes.set_yticks(range(0, 101, 20))
+    elif lines and all(float(y).is_integer() for line in lines for y in line.y):
         _whole_numbers(axes.yaxis)
     if is_log[1]:
         axes.set_yscale("log")
@@ -235,7 +237,7 @@ def _plain_powers(axis: Any) -> None:
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     low, high = axis.get_view_interval()
-    narrow = low > 0 and math.log10(high / low) < 1.6
+    narrow = low > 0 and math.log10(high / low) < 2.3
     axis.set_major_locator(LogLocator(subs=(1, 2, 5) if narrow else (1,)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.10g}"))
     axis.set_minor_formatter(NullFormatter())
@@ -244,7 +246,7 @@ def _plain_powers(axis: Any) -> None:
 def _whole_numbers(axis: Any) -> None:
     from matplotlib.ticker import MaxNLocator
 
-    axis.set_major_locator(MaxNLocator(nbins=7, integer=True, min_n_ticks=1))
+    axis.set_major_locator(MaxNLocator(nbins=6, integer=True, min_n_ticks=1, steps=[1, 2, 5, 10]))
 
 
 def _shortened(label: str, longest: int = 27) -> str:

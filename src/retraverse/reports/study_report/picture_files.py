@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, cast
 
 from retraverse.datasets import GroundTruth
 from retraverse.errors import RetraverseError
-from retraverse.images import Traverse
+from retraverse.images import Frame, Traverse
 from retraverse.reports.pictures import thumbnail
 from retraverse.reports.study_report.artefacts import slug
 from retraverse.reports.study_report.page_files import put
 from retraverse.studies.records import RunRecord
+from retraverse.types import ImageArray
 
 if TYPE_CHECKING:
     from retraverse.images.jpeg import Encoder
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 __all__ = ["PictureFiles", "PictureSource", "Pictures", "Side"]
 
 Side = Literal["query", "reference"]
+_FEW = 24
+"""New thumbnails that a condition may have in any case, while there are any left."""
 
 
 class PictureSource(Protocol):
@@ -50,9 +53,12 @@ class PictureFiles:
     out: Path
     pictures: Pictures | None
     most: int = 3000
-    """Thumbnails in the whole report at most."""
+    """Thumbnails of matches in the whole report at most."""
+    granted: int | None = None
+    """How many there may be by now, None = `most`; see `grant`."""
     written: dict[str, str] = field(default_factory=dict)
     """Name of a picture -> its address relative to the pages, "" where it cannot be had."""
+    _n_written: int = 0
     _sources: dict[str, PictureSource | None] = field(default_factory=dict)
     _traverses: dict[tuple[str, ...], Traverse] = field(default_factory=dict)
 
@@ -80,10 +86,40 @@ class PictureFiles:
             return ""
         name = f"{slug(run.dataset)}/{side[0]}{frame}-{_worsening_name(run, side)}"
         if name not in self.written:
-            if sum(map(bool, self.written.values())) >= self.most:
+            if self._n_written >= (self.most if self.granted is None else self.granted):
                 return ""
             self.written[name] = self._write(traverse, frame, name)
+            self._n_written += bool(self.written[name])
         return self.written[name]
+
+    def grant(self, shares: int) -> None:
+        """Allow one of `shares` equal shares of the thumbnails that are left, at least a few.
+
+        So that the first of many runs do not take all of them.
+        """
+        left = self.most - self._n_written
+        self.granted = min(self.most, self._n_written + max(_FEW, left // max(shares, 1)))
+
+    def frame(self, run: RunRecord, side: Side, index: int) -> Frame | None:
+        """Return a frame as `run` saw it, None if it is not at hand."""
+        traverse = self._traverse(run, side)
+        return None if traverse is None or not 0 <= index < len(traverse) else traverse[index]
+
+    def drawn(self, run: RunRecord, name: str, pixels: ImageArray) -> str:
+        """Write a picture made of a frame of `run`; return its address.
+
+        Parameters
+        ----------
+        run : RunRecord
+        name : str
+            Tells it from the other pictures of the dataset.
+        pixels : uint8 array, shape (H, W, 3)
+        """
+        jpeg = thumbnail(pixels)[0]
+        content = hashlib.sha256(jpeg).hexdigest()[:8]
+        address = f"pictures/{slug(run.dataset)}/{slug(name)}-{content}.jpg"
+        put(self.out / address, jpeg)
+        return address
 
     def frame_name(self, run: RunRecord, side: Side, frame: int) -> str:
         """Return the file name of a frame, "" if the pictures are not at hand."""

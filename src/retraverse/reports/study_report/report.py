@@ -19,9 +19,10 @@ from retraverse.reports.study_report.artefacts import (
     slug,
 )
 from retraverse.reports.study_report.chapters import CHAPTERS, ChapterInput
-from retraverse.reports.study_report.exports import artefact_keys, write_exports
+from retraverse.reports.study_report.choices import choices_table
+from retraverse.reports.study_report.exports import artefact_keys, table_csv, write_exports
+from retraverse.reports.study_report.findings import findings, tells_interval
 from retraverse.reports.study_report.overview import (
-    best_table,
     datasets_table,
     headline,
     troubles,
@@ -114,8 +115,6 @@ def write_study_report(
 
     caches = [Path(cache)] if cache is not None else [study / "cache" for study in studies]
     thumbnails = PictureFiles(out, pictures)
-    files = RunFiles(out, caches, thumbnails, in_full)
-    files.write(records, progress)
     made = []
     by_page = _by_page(records)
     for key in progress(list(by_page), total=len(by_page), label="pages of the report"):
@@ -123,6 +122,8 @@ def write_study_report(
             key, tuple(by_page[key]), in_full, SeriesBook({}), published, thumbnails
         )
         made.append(_finished(CHAPTERS[key](given), given))
+    # The pages' own pictures come first: those of runs end where there are enough.
+    RunFiles(out, caches, thumbnails, in_full).write(records, progress)
     links = [(page_name(chapter.key), page_title(chapter)) for chapter in made]
     name = _study_name(records, Path(study_folder))
     for chapter in made:
@@ -153,20 +154,27 @@ def _study_name(records: Sequence[RunRecord], study: Path) -> str:
 
 
 def _finished(chapter: Chapter, given: ChapterInput) -> Chapter:
-    """Return the chapter without empty figures and sections, and with what is missing of each."""
+    """Return the chapter without what is empty, and with what was found and is missing."""
     sections = []
     for section in chapter.sections:
         kept = tuple(item for item in section.artefacts if not _is_empty(item))
         if kept:
             sections.append(replace(section, artefacts=kept))
     absent = tuple(map(dataset_title, given.absent))
-    return replace(chapter, sections=tuple(sections), absent=absent)
+    tested = tuple(test for test in check_expectations(given.records) if test.holds is not None)
+    return replace(
+        chapter,
+        sections=tuple(sections),
+        absent=absent,
+        findings=findings(chapter.key, given.records),
+        expectations=tested,
+    )
 
 
 def _is_empty(artefact: Artefact) -> bool:
     if isinstance(artefact, Figure):
         return not artefact.panels
-    return not (artefact.rows if isinstance(artefact, Table) else artefact.cases)
+    return not (artefact.cases if isinstance(artefact, Sheet) else artefact.rows)
 
 
 @dataclass(frozen=True)
@@ -177,7 +185,7 @@ class _Shown:
     item: Artefact
     exports: Sequence[Any]
     kind: str
-    """``"table"``, ``"figure"``, ``"sheet"``."""
+    """``"table"``, ``"figure"``, ``"sheet"``, ``"gallery"``."""
 
 
 def _write_chapter(
@@ -209,6 +217,7 @@ def _write_chapter(
             "chapter": chapter,
             "shown": shown,
             "absent": chapter.absent,
+            "has_intervals": any(tells_interval(said) for _, said in chapter.findings),
             "techniques": [(slug(name), name) for name in techniques],
             "troubles": troubles(chapter.records),
             **_frame(links, points, pages, study, page_name(chapter.key)),
@@ -228,8 +237,9 @@ def _write_index(
     here = {run.dataset for run in measured}
     wanted = [name for chapter in chapters for name in BY_CHAPTER.get(chapter.key, ())]
     absent = [name for name in dict.fromkeys(wanted) if name not in here]
-    best = best_table(measured)
-    for row in best.rows:
+    choices = choices_table(measured)
+    put(out / "exports" / "choices.csv", table_csv(choices).encode())
+    for row in choices.rows:
         for cell in row.cells:
             if cell.run is not None:
                 links.link(cell.run)
@@ -241,7 +251,7 @@ def _write_index(
             "headline": headline(records),
             "records": records,
             "chapters": [(page_name(chapter.key), chapter) for chapter in chapters],
-            "best": best,
+            "choices": choices,
             "datasets": datasets_table(records, absent),
             "expectations": check_expectations(records),
             "troubles": troubles(records),

@@ -114,15 +114,16 @@ class RunFiles:
                 now[name] = self._content(runs)
                 if before.get(name) != now[name]:
                     outdated.append(runs)
-            self._write_some(outdated)
+            self._write_some(outdated, len(ordered) - len(now) + len(outdated))
         put(self.out / "runs" / _LIST, json.dumps(now, indent=0).encode())
         return len(groups)
 
-    def _write_some(self, groups: Sequence[Sequence[RunRecord]]) -> None:
-        """Write some files; the long columns of all their runs are read at once."""
+    def _write_some(self, groups: Sequence[Sequence[RunRecord]], n_left: int) -> None:
+        """Write some of `n_left` files; the long columns of all their runs are read at once."""
         chosen = [_worth_stepping_through(runs, self.n_lengths) for runs in groups]
         whole = iter(self.in_full([run for runs in chosen for run in runs]))
-        for runs, picked in zip(groups, chosen, strict=True):
+        for at, (runs, picked) in enumerate(zip(groups, chosen, strict=True)):
+            self.pictures.grant(n_left - at)
             name = run_address(runs[0])[0]
             data = self._data(runs, list(islice(whole, len(picked))))
             text = json.dumps(data, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
@@ -149,7 +150,7 @@ class RunFiles:
         truth = self.pictures.truth(runs[0])
         first = chosen[0]
         return {
-            "title": f"{first.technique} on {dataset_title(first.dataset)}",
+            "title": _title(first),
             "place": place_text(first),
             "measured": measured_on(first),
             "settings": _settings(first),
@@ -208,6 +209,11 @@ class RunFiles:
             self.pictures.address(run, side, frame),
             self.pictures.frame_name(run, side, frame),
         )
+
+
+def _title(run: RunRecord) -> str:
+    matcher = "" if run.matcher == "mean" else f", {run.matcher}"
+    return f"{run.technique}{matcher} on {dataset_title(run.dataset)}"
 
 
 def _by_length(run: RunRecord) -> float:

@@ -89,11 +89,13 @@ class Runs:
         names = _names(sorted(set(keys)))
         for key in sorted(names):
             book.get(names[key], key.technique)
+        self._series_of: dict[str, Series] = {}
         found: dict[tuple[Series, str, Place], list[RunRecord]] = {}
         for record, key in zip(self.records, keys, strict=True):
             series = book.get(names[key], record.technique)
             place = Place(record.compression_query, record.compression_reference, record.resize)
             found.setdefault((series, record.dataset, place), []).append(record)
+            self._series_of[record.run_id] = series
         self._found = {group: _by_length(runs) for group, runs in found.items()}
         self.series = sorted({group[0] for group in found})
         self.datasets = sorted({record.dataset for record in self.records}, key=dataset_order)
@@ -129,6 +131,10 @@ class Runs:
     def at(self, series: Series, dataset: str, place: Place) -> tuple[RunRecord, ...]:
         """Return the runs of one line at one place, by rising K, dynamic last."""
         return self._found.get((series, dataset, place), ())
+
+    def series_of(self, record: RunRecord) -> Series:
+        """Return the line that one of these runs belongs to."""
+        return self._series_of[record.run_id]
 
     def places_of(self, series: Series, dataset: str) -> list[Place]:
         """Return the places where a line has runs on a dataset."""
@@ -221,7 +227,7 @@ def _encoder_words(encoder: str, others: set[str]) -> list[str]:
         return []
     common = set.intersection(*(set(other.split()) for other in others))
     own = " ".join(word for word in encoder.split() if word not in common)
-    return [f"{own or 'plain'} encoder"]
+    return [f"{own.replace('optimize', 'optimising') or 'plain'} encoder"]
 
 
 def _differing(parameters: str, others: Sequence[str]) -> list[str]:

@@ -43,6 +43,10 @@ MEANINGS: Mapping[str, str] = {
     "t_c": "Compression time: resizing and JPEG-encoding one query picture.",
     "t_total": "t_VPR + t_c × K: one answer, compressing its pictures included.",
     "d": "Data of one answer: mean bytes of a query picture × K.",
+    "window bytes": "Mean bytes of a query picture × K: what a robot sends for one answer; the "
+    "map's own pictures are not counted.",
+    "time of a frame": "t_e + t_m: describing a new picture and matching the window that ends with "
+    "it, when the descriptors of the frames before are kept.",
     "windows": "Query windows that were answered: Q − K + 1 for a fixed K.",
     "candidates": "Map windows that each of them could take: R − K + 1 for a fixed K.",
     "query picture": "Mean bytes of a query picture's file as it is sent and described.",

@@ -52,7 +52,7 @@ def test_a_real_study_becomes_pages(study: Path) -> None:
     for title in ("Figure 6.1", "Table 6.1", "Figure 6.2", "Tables 6.3 to 6.6"):
         assert title in page
     # Sizes beside each other, by the word in which the encoders differ.
-    assert "optimize encoder" in page
+    assert "optimising encoder" in page
     assert "plain encoder" in page
     for run in read_light_records([study / "study"]):
         file = index.parent / "runs" / f"{run_address(run)[0]}.js"

@@ -24,7 +24,10 @@ from tests.unit.reports.test_comparison_report import Page
 
 from retraverse.errors import DataMissingError, InputError
 from retraverse.reports import write_study_report
+from retraverse.reports.study_report.picture_files import PictureFiles, Side
+from retraverse.reports.study_report.run_files import RunFiles
 from retraverse.studies.records import RunRecord
+from retraverse.types import no_progress
 
 PAGES = ("index", "chapter-3", "chapter-4", "chapter-5", "chapter-6", "chapter-7", "runs")
 MOST_BYTES = 3_000_000
@@ -77,7 +80,9 @@ def test_pages_are_small_whole_and_ask_for_nothing_elsewhere(
     assert addresses
     for address in addresses:
         assert "//" not in address
-        assert (report / address).is_file(), address
+        file, _, anchor = address.partition("#")
+        assert (report / file).is_file(), address
+        assert not anchor or f'id="{anchor}"' in (report / file).read_text(), address
     assert [tag for tag, attributes in page.tags if "src" in attributes] == []
     ids = [attributes["id"] for _, attributes in page.tags if "id" in attributes]
     assert len(ids) == len(set(ids))
@@ -204,6 +209,58 @@ def test_matches_are_shown_in_pictures_where_they_are_at_hand(tmp_path: Path) ->
     assert np.abs(good - bad).mean() > 2  # at the compression used
 
 
+def test_the_first_of_many_runs_leave_pictures_to_the_last(tmp_path: Path) -> None:
+    runs = [make_run(chapter="5", compression=(c, c)) for c in range(0, 90, 10)]
+    write_study(tmp_path, runs)
+    drives = {"corridor": MadeUpDrives(ROUTES["corridor"])}
+    pictures = PictureFiles(tmp_path / "out", drives.get, most=240)
+    files = RunFiles(tmp_path / "out", [], pictures, lambda chosen: chosen)
+    assert files.write(runs, no_progress) == len(runs)
+    assert len(list((tmp_path / "out").rglob("*.jpg"))) == 240
+    for run in runs:
+        shown = opened(tmp_path / "out", run)["matches"]["1"]["p"]  # type: ignore[index]
+        assert sum(bool(address) for trio in shown.values() for address, _ in trio) >= 240 // 9
+
+
+def test_sheets_come_before_the_pictures_of_runs(tmp_path: Path) -> None:
+    seen: list[str] = []
+
+    class Noting(PictureFiles):
+        def address(self, run: RunRecord, side: Side, frame: int) -> str:
+            seen.append("picture")
+            return super().address(run, side, frame)
+
+    def progress(items: object, *, total: int, label: str) -> object:
+        seen.append(label)
+        return items
+
+    write_study(tmp_path, [make_run(chapter="4", length=k) for k in ("1", "5")])
+    drives = {"corridor": MadeUpDrives(ROUTES["corridor"])}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("retraverse.reports.study_report.report.PictureFiles", Noting)
+        write_study_report(
+            tmp_path,
+            tmp_path / "out",
+            pictures=drives.get,
+            progress=progress,  # type: ignore[arg-type]
+        )
+    assert seen[0] == "pages of the report"
+    assert seen[1] == "picture"
+    assert seen.index("runs of the report") > 48
+
+
+def test_dataset_sizes_of_chapter_7_are_those_of_its_jpegs(tmp_path: Path) -> None:
+    sizes = (16, 64)
+    runs = [make_run(chapter="7", resize=size, compression=(25, 25)) for size in sizes]
+    write_study(tmp_path, [*runs, make_run(chapter="7", resize=64, compression=(99, 99))])
+    out = write_study_report(tmp_path, tmp_path / "out").parent
+    (row,) = [row for row in rows_of(out, "7/table-7-1-size-of-each-dataset.csv")
+              if row["Dataset"] == "Corridor"]  # fmt: skip
+    for size, run in zip(sizes, runs, strict=True):
+        total = run.query_bytes_total + run.reference_bytes_total
+        assert float(row[f"{size} px"]) == total
+
+
 def test_sheets_show_right_and_wrong_sequences(tmp_path: Path) -> None:
     runs = [make_run(chapter="4", length=k) for k in ("1", "5")]
     write_study(tmp_path, runs)
@@ -327,4 +384,4 @@ def test_progress_is_told(tmp_path: Path) -> None:
     shown: Callable[..., object] = progress
     write_study(tmp_path, [make_run()])
     write_study_report(tmp_path, tmp_path / "out", progress=shown)  # type: ignore[arg-type]
-    assert seen == ["runs of the report", "pages of the report"]
+    assert seen == ["pages of the report", "runs of the report"]

@@ -13,8 +13,10 @@ from retraverse.reports.study_report.chapters.context import (
     long_table,
     percent_cell,
 )
+from retraverse.reports.study_report.chapters.regions import region_galleries
 from retraverse.reports.study_report.chapters.sheets import match_sheets
 from retraverse.reports.study_report.figures import (
+    PERCENT,
     accuracy_percent,
     first_run,
     over_length,
@@ -83,6 +85,7 @@ def chapter_3(given: ChapterInput) -> Chapter:
                 ),
             ),
             Section("What does the length do?", tuple(_length_figures(given, headlines))),
+            Section("Where does it look?", region_galleries(given)),
             Section(
                 "Right and wrong, in pictures",
                 match_sheets(given, headlines.records, number="Figures 3.11, 3.12"),
@@ -218,6 +221,7 @@ def _length_figures(given: ChapterInput, headlines: Runs) -> Sequence[Figure]:
             caption="The same similarity matrix, matched with every K.",
             definitions=meanings("accuracy", "K"),
             longest=20,
+            y_limits=PERCENT,
         ),
         over_length(
             over,

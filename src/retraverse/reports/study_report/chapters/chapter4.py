@@ -7,40 +7,38 @@ from retraverse.reports.study_report.artefacts import (
     Artefact,
     Cell,
     Chapter,
-    Row,
     Section,
     Table,
 )
+from retraverse.reports.study_report.chapters.budget import budget_tables
 from retraverse.reports.study_report.chapters.context import (
     ChapterInput,
-    auc_cell,
     long_table,
     percent_cell,
     published_key,
     seconds_cell,
     whole_cell,
 )
+from retraverse.reports.study_report.chapters.curves import curves_by_line, fixed_curve
 from retraverse.reports.study_report.chapters.sheets import match_sheets
 from retraverse.reports.study_report.figures import (
     accuracy_percent,
     over_length,
-    plainest,
     scattered,
 )
 from retraverse.reports.study_report.published import published_value
-from retraverse.reports.study_report.series import Runs, Series
+from retraverse.reports.study_report.series import Runs
 from retraverse.reports.study_report.words import dataset_title, meanings
 from retraverse.reports.wording import NOTHING
 from retraverse.studies.records import RunRecord
 from retraverse.studies.selection import (
     boost,
-    largest_within,
     length_of,
     per_compute_unit,
     smallest_length,
 )
 
-__all__ = ["chapter_4", "fixed_curve", "smallest_table"]
+__all__ = ["chapter_4", "smallest_table"]
 
 
 def chapter_4(given: ChapterInput) -> Chapter:
@@ -56,7 +54,7 @@ def chapter_4(given: ChapterInput) -> Chapter:
             Section("What do they cost?", _costs(given, runs)),
             Section(
                 "In the time of the best technique without sequences",
-                tuple(_budget_tables(given, runs)),
+                tuple(budget_tables(given, runs)),
                 "The budget is t_VPR of the technique that is most accurate at K = 1.",
             ),
             Section(
@@ -75,22 +73,6 @@ def _middling(runs: Runs) -> list[RunRecord]:
     return runs.where(lambda run: length_of(run) == middle)
 
 
-def fixed_curve(runs: Runs, series: Series, dataset: str) -> tuple[RunRecord, ...]:
-    """Return a line's runs with fixed K, pictures worsened least."""
-    place = plainest(runs.places_of(series, dataset))
-    found = runs.at(series, dataset, place) if place else ()
-    return tuple(run for run in found if length_of(run) is not None)
-
-
-def _curves(runs: Runs) -> list[tuple[Series, str, tuple[RunRecord, ...]]]:
-    return [
-        (series, dataset, curve)
-        for dataset in runs.datasets
-        for series in runs.series
-        if (curve := fixed_curve(runs, series, dataset))
-    ]
-
-
 def _until_full(curve: Sequence[RunRecord]) -> int | None:
     """Return the smallest K with 100 %, where figures of the thesis end; None if it is not."""
     smallest = smallest_length(tuple(curve))
@@ -100,7 +82,7 @@ def _until_full(curve: Sequence[RunRecord]) -> int | None:
 def _boosts(runs: Runs) -> dict[str, float]:
     return {
         run.run_id: math.nan if value is None else value
-        for _, _, curve in _curves(runs)
+        for _, _, curve in curves_by_line(runs)
         for run, (_, value) in zip(curve, boost(curve), strict=False)
     }
 
@@ -109,7 +91,7 @@ def _help(given: ChapterInput, runs: Runs) -> tuple[Artefact, ...]:
     boosts = _boosts(runs)
     singles = {
         (run.dataset, series): run.accuracy
-        for series, _, curve in _curves(runs)
+        for series, _, curve in curves_by_line(runs)
         for run in curve
         if run.sequence_length == "1"
     }
@@ -165,7 +147,7 @@ def _against_single(
 def smallest_table(given: ChapterInput, runs: Runs, *, number: str) -> Table:
     """Return the smallest K with 100 % of every line and dataset, and what it leaves."""
     rows = []
-    for series, dataset, curve in _curves(runs):
+    for series, dataset, curve in curves_by_line(runs):
         smallest = smallest_length(curve)
         first = smallest.first if smallest else None
         stays = smallest.stays if smallest else None
@@ -240,7 +222,7 @@ def _costs(given: ChapterInput, runs: Runs) -> tuple[Artefact, ...]:
 def encoding_table(given: ChapterInput, runs: Runs, *, number: str) -> Table:
     """Return t_e and descriptor size of every technique, a row for each dataset."""
     rows = []
-    for series, _, curve in _curves(runs):
+    for series, _, curve in curves_by_line(runs):
         run = curve[0]
         thesis = published_value(number, published_key(run), "any") if given.is_published else ""
         rows.append(
@@ -261,59 +243,4 @@ def encoding_table(given: ChapterInput, runs: Runs, *, number: str) -> Table:
         head=("t_e", "Numbers in the descriptor"),
         caption="Ours on the machine of the run's provenance; the thesis' on an Intel i7-4790K.",
         definitions=meanings("t_e"),
-    )
-
-
-def _budget_tables(given: ChapterInput, runs: Runs) -> list[Table]:
-    return [
-        table for dataset in runs.datasets if (table := _budget_table(given, runs, dataset)).rows
-    ]
-
-
-def _budget_table(given: ChapterInput, runs: Runs, dataset: str) -> Table:
-    of_dataset = [(s, curve) for s, name, curve in _curves(runs) if name == dataset]
-    singles = [curve[0] for _, curve in of_dataset if curve[0].sequence_length == "1"]
-    number = "4.3" if dataset in ("campus_loop", "gardens_point_day") else "4.4"
-    best = max(singles, key=lambda run: run.accuracy, default=None)
-    rows = []
-    for series, curve in of_dataset:
-        chosen = largest_within(curve, best.vpr_s) if best else None
-        if chosen is not None:
-            rows.append(_budget_row(given, number, series, chosen))
-    for run in runs.records:
-        if run.dataset == dataset and run.sequence_length == "dynamic":
-            label = f"{run.technique}, dynamic K"
-            rows.append(_budget_row(given, number, given.book.get(label, run.technique), run))
-    budget = f"{best.technique}, {1000 * best.vpr_s:.3g} ms" if best else ""
-    return Table(
-        "Tables 4.3, 4.4",
-        f"{dataset_title(dataset)}: largest K within the budget ({budget})",
-        ("Technique", "K", "t_e × K", "t_m", "t_VPR", "Accuracy", "AUC", "P_R100"),
-        tuple(rows),
-        "The first K with 100 % if that is smaller; K = 1 even over the budget.",
-        meanings("t_e", "t_m", "t_VPR", "accuracy", "AUC", "P_R100"),
-        is_published=True,
-    )
-
-
-def _budget_row(given: ChapterInput, number: str, series: Series, run: RunRecord) -> Row:
-    def thesis(column: str, unit: str = "") -> str:
-        value = given.published(number, run, column)
-        return f"{value}{unit}" if value else ""
-
-    # A dynamic length has no single time (selection rules).
-    timed = run.sequence_length != "dynamic"
-    length = float(run.sequence_length) if timed else run.mean_sequence_length
-    return Row(
-        (
-            Cell(series.label, run=run),
-            Cell(run.sequence_length, length, run, thesis("K")),
-            seconds_cell(run.encode_s * length if timed else math.nan, None, thesis("t_e", " s")),
-            seconds_cell(run.match_s if timed else math.nan, None, thesis("t_m", " s")),
-            seconds_cell(run.vpr_s if timed else math.nan, None, thesis("t_VPR", " s")),
-            percent_cell(run.accuracy, None, thesis("accuracy")),
-            auc_cell(run, thesis("auc")),
-            percent_cell(run.p_r100, None, thesis("p_r100")),
-        ),
-        series.technique,
     )

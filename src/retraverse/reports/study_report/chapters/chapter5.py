@@ -23,6 +23,7 @@ from retraverse.reports.study_report.pictures_only import picture_runs
 from retraverse.reports.study_report.series import Place, Runs
 from retraverse.reports.study_report.words import (
     compression_text,
+    dataset_order,
     dataset_title,
     meanings,
     size_text,
@@ -118,7 +119,10 @@ def dataset_sizes(given: ChapterInput, *, number: str, over: str) -> Table:
     for run in given.records:
         step = at(run)
         if run.status == "ok" and step is not None and run.query_bytes_total >= 0:
-            found.setdefault(run.dataset, {}).setdefault(step, run)
+            sizes = found.setdefault(run.dataset, {})
+            # At one size the pictures compressed least stand for it.
+            if step not in sizes or run.compression_query < sizes[step].compression_query:
+                sizes[step] = run
     steps = sorted({step for sizes in found.values() for step in sizes}, key=lambda s: (s == 0, s))
     if over == "compression":
         steps = sorted(steps)
@@ -129,7 +133,7 @@ def dataset_sizes(given: ChapterInput, *, number: str, over: str) -> Table:
                 *(_size_cell(given, number, dataset, step, sizes) for step in steps),
             )
         )
-        for dataset, sizes in found.items()
+        for dataset, sizes in sorted(found.items(), key=lambda item: dataset_order(item[0]))
     )
     names = compression_text if over == "compression" else _size_name
     return Table(
@@ -150,8 +154,8 @@ def _compression(run: RunRecord) -> int | None:
 
 
 def _size(run: RunRecord) -> int | None:
-    uncompressed = max(run.compression_query, run.compression_reference) <= 0
-    return run.resize if uncompressed else None
+    is_uniform = run.compression_query == run.compression_reference
+    return run.resize if is_uniform else None
 
 
 def _size_name(size: int) -> str:

@@ -3,7 +3,6 @@
 from retraverse.reports.study_report.artefacts import Artefact, Cell, Chapter, Section, Table
 from retraverse.reports.study_report.chapters.chapter4 import smallest_table
 from retraverse.reports.study_report.chapters.chapter5 import non_uniform_figures
-from retraverse.reports.study_report.chapters.chapter6 import data_figure
 from retraverse.reports.study_report.chapters.chapter7 import time_figure
 from retraverse.reports.study_report.chapters.context import (
     ChapterInput,
@@ -11,6 +10,12 @@ from retraverse.reports.study_report.chapters.context import (
     long_table,
     percent_cell,
     seconds_cell,
+)
+from retraverse.reports.study_report.chapters.data_of_answers import data_figure
+from retraverse.reports.study_report.chapters.matchers import (
+    has_matchers,
+    matcher_means,
+    matcher_tables,
 )
 from retraverse.reports.study_report.figures import (
     PERCENT,
@@ -40,10 +45,18 @@ def beyond(given: ChapterInput) -> Chapter:
     return Chapter(
         "beyond",
         "Beyond the thesis",
-        "Future work of the thesis: other codecs and encoders, other matchers, privacy, "
-        "ConvSequential-SLAM under compression.",
-        _sections(given),
+        "Which way of matching a sequence bears compression best, and what does it cost? The "
+        "thesis names this as future work.",
+        _matcher_sections(given) if has_matchers(given.records) else _sections(given),
         given.records,
+    )
+
+
+def _matcher_sections(given: ChapterInput) -> tuple[Section, ...]:
+    """Return the sections of a page whose axis is the matcher."""
+    return (
+        Section("Which matcher bears compression?", matcher_means(given)),
+        Section("Every technique with every matcher", matcher_tables(given)),
     )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from retraverse.reports.study_report.artefacts import Case, Sheet
 from retraverse.reports.study_report.chapters.context import ChapterInput
 from retraverse.reports.study_report.picture_files import PictureFiles, Side
-from retraverse.reports.study_report.words import dataset_title, length_words
+from retraverse.reports.study_report.words import dataset_order, dataset_title, length_words
 from retraverse.studies.records import RunRecord
 
 __all__ = ["match_sheets"]
@@ -35,7 +35,7 @@ def match_sheets(
     if pictures is None:
         return ()
     chosen = []
-    for dataset in dict.fromkeys(run.dataset for run in runs):
+    for dataset in sorted({run.dataset for run in runs}, key=dataset_order):
         if pictures.source(dataset) is not None:
             here = [run for run in runs if run.dataset == dataset]
             long = [run for run in here if run.mean_sequence_length > 1]

@@ -1,0 +1,152 @@
+"""The engineer's question: the cheapest setting that is accurate enough."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+from retraverse.reports.study_report.artefacts import Cell, Row, Table
+from retraverse.reports.study_report.series import Runs, SeriesBook
+from retraverse.reports.study_report.words import (
+    compression_text,
+    dataset_title,
+    length_words,
+    meanings,
+    place_text,
+    size_text,
+)
+from retraverse.reports.wording import percent, seconds
+from retraverse.studies.records import RunRecord
+from retraverse.studies.selection import data_per_answer
+
+__all__ = ["TARGETS", "cheapest", "choices_table", "frame_seconds"]
+
+TARGETS = (0.9, 0.95, 1.0)
+"""Accuracies that a choice is made for."""
+_FEW = 20
+"""Candidates below which a right answer is easy."""
+_HEAD = (
+    "Dataset",
+    "Accuracy at least",
+    "Cheapest in",
+    "Technique",
+    "K",
+    "c",
+    "Size",
+    "Bytes of a window",
+    "Time of a frame",
+    "Accuracy",
+    "Candidates",
+)
+
+
+def frame_seconds(record: RunRecord) -> float:
+    """Return t_e + t_m: the work for every new picture once the robot is under way, seconds."""
+    return record.encode_s + record.match_s
+
+
+def cheapest(
+    records: Sequence[RunRecord], target: float, cost: Callable[[RunRecord], float]
+) -> RunRecord | None:
+    """Return the run of least cost with at least an accuracy; of equals the more accurate.
+
+    Parameters
+    ----------
+    records : sequence of RunRecord
+    target : float in [0, 1]
+    cost : callable
+        NaN where a run has none; such runs are never the cheapest.
+    """
+    fitting = [run for run in records if run.accuracy >= target and math.isfinite(cost(run))]
+    return min(fitting, key=lambda run: (cost(run), -run.accuracy, run.run_id), default=None)
+
+
+def choices_table(records: Sequence[RunRecord]) -> Table:
+    """Return, for every dataset and target, the settings of fewest bytes and of least time."""
+    measured = [run for run in records if run.status == "ok"]
+    # Named without encoder and resizer, which are written beside c where they count.
+    names = Runs([replace(run, encoder="", resizer="") for run in measured], SeriesBook({}))
+    rows = [
+        row
+        for dataset in names.datasets
+        for target in TARGETS
+        for row in _rows(names, [run for run in measured if run.dataset == dataset], target)
+    ]
+    return Table(
+        "",
+        "Which setting to choose",
+        _HEAD,
+        tuple(rows),
+        "The cheapest of all runs that reaches the accuracy; a click opens it. Being the best of "
+        "many flatters a run: its 95 % interval says how sure its accuracy is (100 to 100: no "
+        "window was wrong, which says little of few windows). Few candidates "
+        "left (long windows on short drives) make a right answer easy.",
+        meanings("window bytes", "time of a frame", "accuracy", "interval", "K", "c", "candidates"),
+        lead=4,
+    )
+
+
+_COSTS: tuple[tuple[str, Callable[[RunRecord], float]], ...] = (
+    ("bytes", data_per_answer),
+    ("time", frame_seconds),
+)
+
+
+def _rows(runs: Runs, here: Sequence[RunRecord], target: float) -> list[Row]:
+    head = (Cell(dataset_title(here[0].dataset)), Cell(f"{100 * target:g} %", target))
+    chosen = _by_run({name: cheapest(here, target, cost) for name, cost in _COSTS})
+    if not chosen:
+        best = max(here, key=lambda run: run.accuracy)
+        most = f"none; the most accurate is {percent(best.accuracy)}: {_setting(runs, best)}"
+        return [Row(head, absent=most)]
+    return [Row((*head, Cell(name), *_cells(runs, run)), run.technique) for name, run in chosen]
+
+
+def _by_run(found: Mapping[str, RunRecord | None]) -> list[tuple[str, RunRecord]]:
+    """Return (what it is cheapest in, run): one entry where one run is cheapest in both."""
+    entries: dict[str, tuple[str, RunRecord]] = {}
+    for name, run in found.items():
+        if run is not None:
+            before = entries.get(run.run_id)
+            entries[run.run_id] = (f"{before[0]} and {name}" if before else name, run)
+    return list(entries.values())
+
+
+def _setting(runs: Runs, run: RunRecord) -> str:
+    place = place_text(run)
+    words = f"{runs.series_of(run).label}, {length_words(run)}"
+    return words if place.startswith("pictures") else f"{words}, {place}"
+
+
+def _cells(runs: Runs, run: RunRecord) -> tuple[Cell, ...]:
+    data, time = data_per_answer(run), frame_seconds(run)
+    dynamic = "" if run.sequence_length.isdigit() else "mean"
+    interval = f"({100 * run.accuracy_low:.0f} to {100 * run.accuracy_high:.0f})"
+    return (
+        Cell(runs.series_of(run).label, run=run),
+        Cell(f"{run.mean_sequence_length:.3g}", run.mean_sequence_length, note=dynamic),
+        Cell(
+            _compressions(run),
+            float(max(run.compression_query, run.compression_reference)),
+            note=" ".join(run.encoder.split()[2:]),
+        ),
+        Cell(f"{run.resize} px" if run.resize else "as is", float(run.resize or math.inf)),
+        Cell(size_text(data), data),
+        Cell(seconds(time), time),
+        Cell(
+            percent(run.accuracy),
+            run.accuracy,
+            note=interval if math.isfinite(run.accuracy_low) else "",
+        ),
+        Cell(
+            f"{run.n_candidates:,}",
+            float(run.n_candidates),
+            note="few" if run.n_candidates < _FEW else "",
+        ),
+    )
+
+
+def _compressions(run: RunRecord) -> str:
+    query, reference = run.compression_query, run.compression_reference
+    if query == reference:
+        return compression_text(query)
+    return f"{compression_text(query)} query, {compression_text(reference)} map"
