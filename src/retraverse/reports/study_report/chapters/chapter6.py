@@ -17,6 +17,7 @@ from retraverse.reports.study_report.chapters.least_data import (
     mixed_figures,
     total_table,
 )
+from retraverse.reports.study_report.chapters.saved import savings_table
 from retraverse.reports.study_report.figures import first_run, over_compression
 from retraverse.reports.study_report.pictures_only import picture_runs
 from retraverse.reports.study_report.series import Runs
@@ -41,6 +42,10 @@ def chapter_6(given: ChapterInput) -> Chapter:
         (
             Section("How small do pictures become?", _sizes(given, runs, pictures)),
             Section("How long must sequences be, and what do they weigh?", _lengths(given, runs)),
+            Section(
+                "What does compression save at equal accuracy?",
+                (savings_table(given, runs),),
+            ),
             Section(
                 "Query and map compressed differently",
                 mixed_figures(picks),
