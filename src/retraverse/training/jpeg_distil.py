@@ -1,8 +1,10 @@
 """A network that does not mind JPEG, learned without labels.
 
 The network on the compressed picture learns to give what the frozen original gives on the clean
-one. Any pictures will do; what the network knows of places is kept, since the original says what
-to answer.
+one. What the network knows of places is kept, since the original says what to answer. Any pictures
+will do, and the best are those of the map's own drive: begun with ``"jpeg"``, the weights that come
+with this program, some minutes on the map's clean pictures make the network expect this very route
+(docs/jpeg-tuned.md).
 
 Conventions
 - A batch is `pictures` pictures, each in `views` neighbouring views (as the frames of a drive
@@ -50,7 +52,6 @@ from retraverse.training.proxy import retrieval_figures
 from retraverse.training.tuned_network import Outputs, as_input, learned_technique, tunable
 from retraverse.types import ImageArray, Progress, no_progress
 from retraverse.weights.records import is_name
-from retraverse.weights.store import load_tensors
 
 __all__ = ["DistilSettings", "JpegDistil", "distil_loss", "scaled_views", "train_jpeg_distil"]
 
@@ -129,7 +130,7 @@ class JpegDistil:
         technique: LearnedTechnique,
         pictures: Sequence[ImageArray],
         settings: DistilSettings,
-        start: Path | None = None,
+        start: Path | str | None = None,
     ) -> None:
         if len(pictures) < settings.pictures:
             raise ConfigError(
@@ -142,8 +143,9 @@ class JpegDistil:
         self._smaller_view = scaled_views(settings.view, self._smaller, technique)
         self.settings = settings
         self._pictures = pictures
-        first = technique.network() if start is None else _network_of(technique, start)
-        self._start = "" if start is None else file_digest(start)
+        begun = technique if start is None else _with_weights(technique, start)
+        first = begun.network()
+        self._start = "" if start is None else file_digest(begun.weights_path())
         learning = tunable(first, settings.frozen)
         self.network = Outputs(learning, inner)
         self._original = Outputs(folded(technique.network()).requires_grad_(False), inner)
@@ -189,9 +191,9 @@ class JpegDistil:
         return {**settings, **about, "n": len(self._pictures)}
 
 
-def _network_of(technique: LearnedTechnique, weights: Path) -> torch.nn.Module:
-    """Return the technique's network with other weights."""
-    return technique.build_network(load_tensors(weights).tensors).eval()
+def _with_weights(technique: LearnedTechnique, weights: Path | str) -> LearnedTechnique:
+    """Return the technique with other weights: a file, or a name as its parameters take it."""
+    return type(technique)(replace(technique.parameters, weights=str(weights)))
 
 
 def _inner_modules(technique: LearnedTechnique, settings: DistilSettings) -> tuple[str, ...]:
@@ -261,7 +263,7 @@ def train_jpeg_distil(
     folder: Path,
     settings: DistilSettings | None = None,
     *,
-    start: Path | None = None,
+    start: Path | str | None = None,
     check: Path | None = None,
     limit: int = 0,
     resume: bool = False,
@@ -277,8 +279,9 @@ def train_jpeg_distil(
     folder : Path
         Where everything goes; made if need be.
     settings : DistilSettings, optional
-    start : Path, optional
-        Weights to begin with, of an earlier tuning; what is learned stays the original's answers.
+    start : Path or str, optional
+        Weights to begin with, of an earlier tuning: a file, or a name such as ``"jpeg"``. What is
+        learned stays the original's answers.
     check : Path, optional
         A folder of other pictures to measure on, before and after.
     limit : int
