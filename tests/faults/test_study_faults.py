@@ -247,6 +247,15 @@ def test_an_unreadable_picture_and_a_vanished_drive(data: Path, tmp_path: Path) 
     assert "007.png" in errors["gone"]
 
 
+@pytest.mark.parametrize("place", ["", "records"])
+def test_what_a_killed_study_left_half_written_goes(data: Path, tmp_path: Path, place: str) -> None:
+    folder = tmp_path / "study" / place
+    folder.mkdir(parents=True)
+    (folder / ".0123456789abcdef.tmp").write_bytes(b"half a plan or record")
+    run_study(tiny_plan(data), tmp_path / "study", workers=0)
+    assert left_overs(tmp_path) == []
+
+
 def test_the_clock_set_back(data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # The wall clock runs backwards; durations must not notice.
     clock = iter(range(10**9, 0, -1000))

@@ -72,8 +72,9 @@ class StudyFolder:
             raise InputError(f"study {path}: cannot be written to: {error.strerror}") from error
         try:
             _acquire(lock, path)
-            for left_over in folder.records.glob(".*.tmp"):
-                left_over.unlink(missing_ok=True)
+            for place in (path, folder.records):
+                for left_over in place.glob(".*.tmp"):
+                    left_over.unlink(missing_ok=True)
             yield folder
         finally:
             os.close(lock)

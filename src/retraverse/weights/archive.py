@@ -5,6 +5,7 @@ and the bytes are counted while they come: a small archive cannot fill the disk.
 """
 
 import contextlib
+import errno
 import fnmatch
 import lzma
 import os
@@ -69,6 +70,11 @@ def _plain_errors(archive: Path) -> Iterator[None]:
     try:
         yield
     except (zipfile.BadZipFile, tarfile.TarError, zlib.error, lzma.LZMAError, EOFError) as error:
+        raise InputError(f"{archive}: damaged archive ({error}); fetch it again") from error
+    except OSError as error:
+        # A damaged table of contents may send the reader before the file's beginning.
+        if error.errno != errno.EINVAL:
+            raise
         raise InputError(f"{archive}: damaged archive ({error}); fetch it again") from error
     except (NotImplementedError, RuntimeError) as error:
         raise InputError(f"{archive}: cannot be unpacked ({error})") from error

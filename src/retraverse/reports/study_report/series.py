@@ -238,5 +238,6 @@ def _differing(parameters: str, others: Sequence[str]) -> list[str]:
     return [
         f"{name} {value}"
         for name, value in mine.items()
-        if any(other.get(name) != value for other in all_values)
+        # What a record does not have, its version did not know.
+        if any(other.get(name, value) != value for other in all_values)
     ]
