@@ -72,8 +72,9 @@ def _plain_errors(archive: Path) -> Iterator[None]:
     except (zipfile.BadZipFile, tarfile.TarError, zlib.error, lzma.LZMAError, EOFError) as error:
         raise InputError(f"{archive}: damaged archive ({error}); fetch it again") from error
     except OSError as error:
-        # A damaged table of contents may send the reader before the file's beginning.
-        if error.errno != errno.EINVAL:
+        # gzip and bzip2 complain of damage without a number; a damaged table of contents may send
+        # the reader before the file's beginning. All else is the disk's.
+        if error.errno not in (None, errno.EINVAL):
             raise
         raise InputError(f"{archive}: damaged archive ({error}); fetch it again") from error
     except (NotImplementedError, RuntimeError) as error:
