@@ -12,6 +12,7 @@ import functools
 import importlib
 import logging
 import os
+import threading
 from types import ModuleType
 from typing import Literal
 
@@ -20,6 +21,7 @@ from retraverse.errors import ConfigError, MissingExtraError
 __all__ = ["backend", "default_threads", "instruction_sets", "native"]
 
 _log = logging.getLogger(__name__)
+_warning = threading.Lock()
 _CHOICES = ("auto", "native", "numpy")
 
 
@@ -78,7 +80,8 @@ def native() -> ModuleType | None:
             "install retraverse again where a C++ compiler is, or unset RETRAVERSE_KERNELS"
         )
     if module is None:
-        _warn_once(reason)
+        with _warning:  # A cache alone lets several threads be the first.
+            _warn_once(reason)
     return module
 
 

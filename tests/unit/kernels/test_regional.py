@@ -1,5 +1,8 @@
 import importlib
 import logging
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -197,6 +200,26 @@ class TestBackend:
             assert [kernels.backend() for _ in range(3)] == ["numpy"] * 3
         assert [record.levelname for record in caplog.records] == ["WARNING"]
         np.testing.assert_array_equal(regional_scores(QUERY, REFERENCES, WEIGHTS), SCORES)
+
+    def test_missing_is_said_once_by_many_threads(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        said: list[str] = []
+
+        def slowly(text: str, *_: object) -> None:
+            time.sleep(0.05)  # Every thread is inside before the first is through.
+            said.append(text)
+
+        monkeypatch.setattr(backend, "_compiled", missing)
+        monkeypatch.setattr(backend._log, "warning", slowly)
+        backend._warn_once.cache_clear()
+        start = threading.Barrier(4)
+
+        def ask(_: int) -> str:
+            start.wait(timeout=30)
+            return kernels.backend()
+
+        with ThreadPoolExecutor(4) as threads:
+            assert list(threads.map(ask, range(4))) == ["numpy"] * 4
+        assert len(said) == 1
 
     def test_threads_from_the_environment(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setenv("RETRAVERSE_THREADS", "3")
