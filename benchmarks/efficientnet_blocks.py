@@ -14,7 +14,7 @@ from _real_sets import RealSet, accuracy, data_folder, real_sets
 
 import retraverse as rt
 from retraverse.techniques.efficientnet import EfficientNet, EfficientNetParameters
-from retraverse.techniques.pooling import pool, unit_rows
+from retraverse.techniques.summarising.pooling import pool, unit_rows
 from retraverse.types import FloatArray
 
 BLOCKS = range(2, 16)

@@ -17,7 +17,7 @@ from _worse_sets import BLOCK, TECHNIQUES, picture_sets, print_head, print_row
 
 import retraverse as rt
 from retraverse.metrics import bootstrap_interval
-from retraverse.studies.jpeg_ablation import JPEG_PARTS, AblationPoint, ablate
+from retraverse.studies.jpeg_ablation import ABLATED_PARTS, AblationPoint, ablate
 
 NAMES = ("CoHOG", "ORB", "HOG 256", "GIST 128", "patchnorm")
 LENGTHS = (1, 10)
@@ -30,7 +30,7 @@ def main() -> None:
     c = int(sys.argv[2]) if len(sys.argv) > 2 else 97
     print(f"c = {c}\n")
     print_head("part", "what is done")
-    for part in JPEG_PARTS:
+    for part in ABLATED_PARTS:
         print_row(part.name, part.summary)
     print()
     print_head("set", "K", "part", *NAMES)
@@ -65,7 +65,7 @@ def tell(items: Iterable[Item], *, total: int, label: str) -> Iterable[Item]:
 def print_set(points: Points, title: str, length: int) -> None:
     clean = [points[title, length, "clean", name].accuracy for name in NAMES]
     print_row(title, length, "clean (accuracy)", *(f"{accuracy:.3f}" for accuracy in clean))
-    for part in JPEG_PARTS[1:]:
+    for part in ABLATED_PARTS[1:]:
         found = [points[title, length, part.name, name] for name in NAMES]
         cells = [cell(one.change, *one.interval) for one in found]
         print_row(title, length, part.name, *cells)
@@ -73,7 +73,7 @@ def print_set(points: Points, title: str, length: int) -> None:
 
 def print_pooled(points: Points, titles: list[str], length: int) -> None:
     """Print the changes over the windows of all sets together."""
-    for part in JPEG_PARTS[1:]:
+    for part in ABLATED_PARTS[1:]:
         cells = []
         for name in NAMES:
             changes = np.concatenate(

@@ -17,8 +17,8 @@ from _real_sets import RealSet, accuracy, data_folder, real_sets
 import retraverse as rt
 from retraverse.errors import RetraverseError
 from retraverse.images import Frame
-from retraverse.techniques.learned import LearnedTechnique
-from retraverse.techniques.quantise import quantise
+from retraverse.techniques.running.learned import LearnedTechnique
+from retraverse.techniques.running.quantise import quantise
 
 BATCHES = (4, 16)
 LENGTHS = (1, 10)

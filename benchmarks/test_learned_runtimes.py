@@ -18,7 +18,7 @@ import pytest
 from _ratios import interleaved_minimum
 
 import retraverse as rt
-from retraverse.techniques.onnx_runtime import export_onnx
+from retraverse.techniques.running.onnx_runtime import export_onnx
 
 SCALE = float(os.environ.get("RETRAVERSE_SCALE", "1"))
 PICTURES = np.random.default_rng(0).integers(0, 256, (16, 240, 320, 3)).astype(np.uint8)

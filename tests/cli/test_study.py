@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from tests.unit.studies.tiny import write_dataset
 
+ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = [sys.executable, "-c", "from retraverse.cli.main import run; run()"]
 Run = Callable[..., subprocess.CompletedProcess[str]]
 PLAN = """
@@ -34,6 +35,28 @@ def run(tmp_path: Path) -> Run:
     return run_it
 
 
+def test_the_plan_of_the_docs_on_a_road_of_ones_own(tmp_path: Path) -> None:
+    """Its pictures are found again without being told where they are."""
+    text = (ROOT / "docs" / "studies.md").read_text(encoding="utf-8")
+    plan = text.partition("```toml\n")[2].partition("```")[0]
+    # A tenth of its runs: what is tried here is that the text is a plan.
+    small = plan.replace("[1, 5, 10]", "[2]").replace("[0, 90, 97]", "[97]")
+    (tmp_path / "plan.toml").write_text(small)
+    drives = write_dataset(tmp_path / "noise", n_frames=12)
+    (drives / "query").rename(tmp_path / "snow")
+    (drives / "reference").rename(tmp_path / "autumn")
+
+    def run_it(*words: str) -> subprocess.CompletedProcess[str]:
+        command = [*PROGRAM, "study", *words]
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=240)
+
+    done = run_it("run", "plan.toml", "--out", "study", "--workers", "1")
+    assert done.returncode == 0, done.stderr
+    assert "24 runs: 24 done now" in done.stdout
+    assert run_it("report", "study", "--out", "pages").returncode == 0
+    assert list((tmp_path / "pages" / "pictures").rglob("*.jpg"))
+
+
 def test_check_run_again_show(run: Run, tmp_path: Path) -> None:
     checked = run("check", "plan.toml", "--workers", 1, "--json")
     assert checked.returncode == 0, checked.stderr
@@ -46,12 +69,12 @@ def test_check_run_again_show(run: Run, tmp_path: Path) -> None:
     assert "6 runs: 6 done now, 0 before, 0 failed, 0 missing; 40 pictures" in first.stdout
     assert (tmp_path / "study" / "plan.toml").read_text() == PLAN
 
-    reported = run("report", "study", "--out", "pages", "--data", "data")
+    reported = run("report", "study", "--out", "pages")
     assert reported.returncode == 0, reported.stderr
     assert "holds: Image bytes fall with the compression c." in reported.stdout
     assert (tmp_path / "pages" / "index.html").is_file()
     assert list((tmp_path / "pages" / "pictures").rglob("*.jpg"))
-    words = ("report", "study", "--out", "bare", "--data", "data", "--no-pictures")
+    words = ("report", "study", "--out", "bare", "--no-pictures")
     assert run(*words).returncode == 0
     assert not (tmp_path / "bare" / "pictures").exists()
 

@@ -14,6 +14,8 @@ from typer.testing import CliRunner
 import retraverse as rt
 from retraverse.cli.main import app
 from retraverse.errors import ConfigError, DataMissingError, InputError
+from retraverse.images.quantisation import STANDARD_TABLES
+from retraverse.studies.tables_file import load_tables
 
 SMALL = ("--set", "block=2", "--set", "resolution=64", "--threads", 1)
 
@@ -99,3 +101,17 @@ def test_wrong_input(classes: Path, tmp_path: Path) -> None:
     with pytest.raises(DataMissingError, match="netvlad"):
         train("netvlad", classes / "a", "-o", out)
     assert not out.exists()
+
+
+def test_jpeg_tables_go_into_a_plan(tmp_path: Path) -> None:
+    write_pictures(tmp_path / "drive", pictures(14, 16))
+    small = ("--compression", 80, "--probes", 2, "--set", "resolution=16")
+    out = tmp_path / "tables.json"
+    said = train("jpeg-tables", tmp_path / "drive", "-o", out, "-t", "sad", *small)
+    figures = said["figures"]
+    assert figures["margin"] >= figures["margin, standard tables"]
+    assert figures["bytes a picture"] == pytest.approx(figures["bytes, standard tables"], rel=0.05)
+    assert load_tables(out) != STANDARD_TABLES
+    write_pictures(tmp_path / "short", pictures(14, 8))
+    with pytest.raises(InputError, match="got 8 frames, expected more than 10 to tune on"):
+        train("jpeg-tables", tmp_path / "short", "-o", out, "-t", "sad")

@@ -5,12 +5,14 @@ import json
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
+from typer.main import get_command
 
-from retraverse.cli.main import VERBS
+from retraverse.cli.main import VERBS, app
 from retraverse.datasets.simulated import Disturbances, simulate_route, write_drive
 
 PROGRAM = [sys.executable, "-c", "from retraverse.cli.main import run; run()"]
@@ -37,6 +39,19 @@ def run(tmp_path: Path) -> Run:
         return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=240)
 
     return run_it
+
+
+def verbs_of(command: Any, words: tuple[str, ...] = ()) -> Iterator[str]:
+    """Yield every verb below a command, as typed."""
+    if not hasattr(command, "commands"):
+        yield " ".join(words)
+        return
+    for name, one in command.commands.items():
+        yield from verbs_of(one, (*words, name))
+
+
+def test_every_verb_is_listed() -> None:
+    assert sorted(VERBS) == sorted(verbs_of(get_command(app)))
 
 
 @pytest.mark.parametrize("verb", ["", *VERBS])

@@ -18,7 +18,7 @@ from retraverse.techniques import (
     FingerprintedTechnique,
     Technique,
 )
-from retraverse.techniques.learned import LearnedTechnique
+from retraverse.techniques.running.learned import LearnedTechnique
 
 NAMES = [info.name for info in rt.techniques()]
 WITH_WEIGHTS = [

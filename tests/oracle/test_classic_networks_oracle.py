@@ -23,7 +23,7 @@ from retraverse.techniques.networks.caffe_tables import (
     graph_of,
     until,
 )
-from retraverse.techniques.torch_runtime import torch_threads
+from retraverse.techniques.running.torch_runtime import torch_threads
 
 COLOUR = (3, 227, 227)
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import retraverse as rt
-from retraverse.techniques.gist_filters import LowPass
+from retraverse.techniques.handmade.gist_filters import LowPass
 
 Shared = Callable[[str], Path]
 

@@ -50,6 +50,8 @@ VERBS = (
     "train calc",
     "train deepseqslam",
     "train netvlad",
+    "train regionvlad",
+    "train jpeg-tables",
     "study check",
     "study run",
     "study show",

@@ -56,7 +56,7 @@ def reproduce(
             cache=out / "cache",
             progress=progress(),
         )
-    index = _report(out, data if pictures else None)
+    index = _report(out, data, with_pictures=pictures)
     if json_output:
         print_json(_summary(results, index))
         return
@@ -73,7 +73,7 @@ def _folder(plan: "StudyPlan") -> str:
     return plan.name.replace(",", "").replace(" ", "-")
 
 
-def _report(out: Path, data: Path | None) -> Path:
+def _report(out: Path, data: Path, *, with_pictures: bool) -> Path:
     from retraverse.cli.view import pictures_of
     from retraverse.reports import write_study_report
 
@@ -81,7 +81,7 @@ def _report(out: Path, data: Path | None) -> Path:
         out / "studies",
         out / "report",
         cache=out / "cache",
-        pictures=pictures_of(data),
+        pictures=pictures_of(out / "studies", data) if with_pictures else None,
         progress=progress(),
     )
 

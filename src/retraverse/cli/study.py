@@ -132,7 +132,7 @@ def report(
     ),
     data: Annotated[
         Path | None,
-        typer.Option("--data", help="Data root: matches are then shown in pictures."),
+        typer.Option("--data", help="Data root, if datasets are not where the plan found them."),
     ] = None,
     cache: CachePath = None,
     published: Annotated[
@@ -148,7 +148,7 @@ def report(
         study,
         out,
         published=published,
-        pictures=pictures_of(data) if pictures else None,
+        pictures=pictures_of(study, data) if pictures else None,
         cache=cache,
         progress=progress(),
     )

@@ -6,11 +6,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from retraverse.cli.options import JsonOutput, Settings, positions_of, read_settings
+from retraverse.cli.options import (
+    JsonOutput,
+    Settings,
+    make_technique,
+    positions_of,
+    read_settings,
+)
 from retraverse.cli.output import print_json, print_table, progress, remark
 from retraverse.images import open_traverse
 from retraverse.registry import read_parameters
-from retraverse.techniques.extras import import_extra
+from retraverse.studies.quantisation import TuningPlan
+from retraverse.techniques.running.extras import import_extra
 
 if TYPE_CHECKING:
     from retraverse.training.loop import LoopSettings
@@ -18,8 +25,10 @@ if TYPE_CHECKING:
 
 __all__ = ["app"]
 
+_HEAD = ("measured", "value")
+
 app = typer.Typer(
-    help="Tune networks on your pictures, or train them on your drive.", no_args_is_help=True
+    help="Tune networks or JPEG on your pictures, or train on your drive.", no_args_is_help=True
 )
 
 Pictures = Annotated[Path, typer.Argument(help="Pictures: a folder, or a folder of folders.")]
@@ -229,6 +238,50 @@ def regionvlad(
         remark(f"vocabulary: {out} (regionvlad's parameter vocabulary takes this path)")
 
 
+@app.command("jpeg-tables")
+def jpeg_tables(
+    drive: Drive,
+    out: Annotated[Path, typer.Option("--out", "-o", help="The JSON file of tables to write.")],
+    technique: Annotated[
+        str, typer.Option("--technique", "-t", help="Whose eyes the pictures are made for.")
+    ] = "patchnorm",
+    settings: Settings = None,
+    compression: Annotated[
+        int, typer.Option("--compression", "-c", min=1, max=99, help="c whose bytes are met.")
+    ] = 95,
+    probes: Annotated[
+        int, typer.Option("--probes", min=2, help="Frames that are compressed in each trial.")
+    ] = TuningPlan().n_probes,
+    json_output: JsonOutput = False,
+) -> None:
+    """Tune JPEG's quantisation tables for a technique on the drive of a map.
+
+    A plan's encoder takes the file: `encoders = [{ optimize = true, tables = "tables.json" }]`, at
+    c = 50. Whether it pays depends on the technique; for most it does not.
+    """
+    from retraverse.studies.quantisation import tune_tables
+    from retraverse.studies.tables_file import save_tables
+
+    found = tune_tables(
+        open_traverse(drive),
+        make_technique(technique, settings),
+        TuningPlan(compression=compression, n_probes=probes),
+        progress=progress(),
+    )
+    save_tables(out, found.tables)
+    figures = {
+        "bytes a picture": found.n_bytes,
+        "bytes, standard tables": found.n_bytes_standard,
+        "margin": found.margin,
+        "margin, standard tables": found.margin_standard,
+    }
+    if json_output:
+        print_json({"tables": str(out), "figures": figures})
+        return
+    print_table([(name, f"{value:.3f}") for name, value in figures.items()], head=_HEAD)
+    remark(f"tables: {out} (an encoder's tables in a study's plan takes this path, at c = 50)")
+
+
 def _loop(
     default: "LoopSettings",
     steps: int | None,
@@ -256,6 +309,6 @@ def _say(outcome: "Outcome", json_output: bool) -> None:
         print_json({**files, "figures": dict(outcome.figures)})
         return
     rows = [(name, f"{value:.3f}") for name, value in outcome.figures.items()]
-    print_table(rows, head=("measured", "value"))
+    print_table(rows, head=_HEAD)
     remark(f"weights: {files['weights']} (a technique's parameter weights takes this path)")
     remark(f"report: {files['report']}")

@@ -16,7 +16,7 @@ def view(
     study: Annotated[Path, typer.Argument(help="The study's folder.")],
     data: Annotated[
         Path | None,
-        typer.Option(help="Data root with the datasets: matches are then shown in pictures."),
+        typer.Option(help="Data root, if the datasets are not where the plan found them."),
     ] = None,
     cache: Annotated[
         Path | None, typer.Option(help="Where the study keeps its matrices, if elsewhere.")
@@ -50,7 +50,7 @@ def view(
                 study,
                 folder,
                 published=published,
-                pictures=pictures_of(data),
+                pictures=pictures_of(study, data),
                 cache=cache,
                 progress=show,
             )
@@ -66,18 +66,22 @@ def view(
             remark("stopped")
 
 
-def pictures_of(data: Path | None) -> Any:
-    """Return what gives the report its pictures: the datasets under a data root, if there is one.
+def pictures_of(study: Path, data: Path | None) -> Any:
+    """Return what gives the report its pictures: a data root, or the folders the plan names.
 
     Raises
     ------
     DataMissingError
         If the data root is not there.
     """
+    from retraverse.datasets.driven_again import find_driven
+    from retraverse.studies.light_records import study_folders
+    from retraverse.studies.study_folder import study_datasets
+
     if data is None:
-        return None
+        folders = study_folders(study)
+        named = {name: one for path in folders for name, one in study_datasets(path).items()}
+        return named.get
     if not data.is_dir():
         raise DataMissingError(f"{data}: no such folder, expected the data root")
-    from retraverse.datasets.known import find_dataset
-
-    return lambda name: find_dataset(name, data)
+    return lambda name: find_driven(name, data)

@@ -9,6 +9,7 @@ Names
 - `decode_grey`, `decode_bgr`: the same decoding for bytes that came from elsewhere.
 - `without_stops`, `measure_motion`: a drive without the frames on which nothing moved.
 - `worsened`, `worsen_frame`, `worsen_each`, `Worsening`: pictures resized and compressed.
+- `worsen_group`, `VideoGroups`: pictures sent together by a video codec.
 - `Encoder`, `encode_jpeg`, `QuantisationTables`: JPEG and its options.
 - `jpeg_traces`: how much JPEG took out of a picture, seen in its pixels.
 - `natural_key`, `PICTURE_SUFFIXES`: how folders are listed.
@@ -22,19 +23,20 @@ from retraverse.images.frame import Frame
 from retraverse.images.jpeg import Encoder, encode_jpeg
 from retraverse.images.jpeg_traces import STRONG_TRACES, jpeg_traces
 from retraverse.images.ordering import natural_key
+from retraverse.images.picture_cache import PictureCache
 from retraverse.images.quantisation import QuantisationTables
 from retraverse.images.sources import Source, open_traverse
 from retraverse.images.stops import MIN_MOTION, measure_motion, without_stops
 from retraverse.images.traverse import SkippedFrame, Traverse
 from retraverse.images.worsen import (
-    PictureCache,
     WorsenedFrame,
-    Worsening,
     frame_bytes,
     worsen_each,
     worsen_frame,
+    worsen_group,
     worsened,
 )
+from retraverse.images.worsening import VideoGroups, Worsening
 
 __all__ = [
     "MIN_MOTION",
@@ -49,6 +51,7 @@ __all__ = [
     "SkippedFrame",
     "Source",
     "Traverse",
+    "VideoGroups",
     "WorsenedFrame",
     "Worsening",
     "decode_bgr",
@@ -62,5 +65,6 @@ __all__ = [
     "without_stops",
     "worsen_each",
     "worsen_frame",
+    "worsen_group",
     "worsened",
 ]

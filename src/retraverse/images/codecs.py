@@ -1,10 +1,7 @@
 """A few pictures in a row as one group of pictures of a video codec: H.265 or AV1.
 
 What a robot would send instead of K JPEG files. A group is encoded on its own, from its first
-picture to its last, and holds everything its decoder needs.
-
-Form of a group, big endian: ``"GOP1"``, codec (1 byte), 1 if grey (1 byte), height, width, number
-of pictures (2 bytes each), then each packet of the encoder after its length (3 bytes).
+picture to its last, and holds everything its decoder needs; `group_bytes` has its byte form.
 
 Conventions
 - ``quality`` is the codec's constant rate factor: **larger is coarser**, at most
@@ -20,28 +17,39 @@ import os
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal, cast, get_args
+from typing import Any, cast
 
 import numpy as np
 
 from retraverse.errors import ConfigError, InputError, MissingExtraError, ShapeError
+from retraverse.images.colour_planes import Planes, coded_size, from_planes, to_planes
 from retraverse.images.decode import check_array
+from retraverse.images.group_bytes import (
+    LONGEST_SIDE,
+    CodecName,
+    GroupHead,
+    join_group,
+    split_group,
+)
 from retraverse.types import ImageArray
 
-__all__ = ["GROUP_CODECS", "CodecName", "GroupCodec", "decode_group", "encode_group"]
+__all__ = [
+    "GROUP_CODECS",
+    "CodecName",
+    "GroupCodec",
+    "check_quality",
+    "codec_versions",
+    "decode_group",
+    "encode_group",
+]
 
-CodecName = Literal["h265", "av1"]
-
-_MAGIC = b"GOP1"
-_HEAD_BYTES = 12
-_LENGTH_BYTES = 3
 _LONGEST_GROUP = 1000
-_SMALLEST_SIDE = 64
-"""SVT-AV1's; smaller pictures are padded, and cut again when decoded."""
+_ONE_BLOCK = 64
+"""Side of x265's largest blocks."""
 
 
 @dataclass(frozen=True)
@@ -57,13 +65,25 @@ class GroupCodec:
     """The largest quality factor."""
     options: Mapping[str, str]
     """What is passed to the encoder beside the quality factor."""
+    if_one_block: Mapping[str, str] = field(default_factory=dict)
+    """What is passed instead where a picture is no wider or no higher than 64 pixels."""
 
     @property
     def label(self) -> str:
         """Encoder and settings in words, for records."""
         return " ".join([self.encoder, *(f"{key}={text}" for key, text in self.options.items())])
 
+    def options_for(self, height: int, width: int) -> dict[str, str]:
+        """Return what is passed to the encoder for pictures of one size."""
+        is_one_block = min(height, width) <= _ONE_BLOCK
+        return {**self.options, **(self.if_one_block if is_one_block else {})}
 
+
+# info=0: else every group begins with two kilobytes of text about the encoder.
+_X265 = (
+    "info=0:log-level=none:pools=none:frame-threads=1:wpp=0"
+    ":lookahead-threads=0:scenecut=0:keyint=-1:repeat-headers=1"
+)
 GROUP_CODECS: Mapping[str, GroupCodec] = MappingProxyType(
     {
         "h265": GroupCodec(
@@ -73,10 +93,10 @@ GROUP_CODECS: Mapping[str, GroupCodec] = MappingProxyType(
             51,
             {
                 "preset": "medium",
-                # info=0: else every group begins with two kilobytes of text about the encoder.
-                "x265-params": "info=0:log-level=none:pools=none:frame-threads=1:wpp=0"
-                ":lookahead-threads=0:scenecut=0:keyint=-1:repeat-headers=1",
+                "x265-params": _X265,
             },
+            # With a single block across x265 gives other bytes each time.
+            {"x265-params": f"{_X265}:ctu=32"},
         ),
         "av1": GroupCodec(
             "av1",
@@ -116,19 +136,17 @@ def encode_group(
     """
     av = _import_av()
     settings = _settings(codec)
-    _check_quality(settings, quality)
+    check_quality(settings, quality)
     pictures = _checked(images)
     height, width = pictures[0].shape[:2]
     grey = pictures[0].ndim == 2
     try:
-        packets = _encode(av, settings, quality, [_to_planes(one) for one in pictures])
+        packets = _encode(av, settings, quality, [to_planes(one) for one in pictures])
     except (av.FFmpegError, OSError, ValueError) as error:
         raise InputError(
             f"{settings.encoder} refuses {width} x {height} pixels: {error}"
         ) from error
-    head = _MAGIC + bytes([get_args(CodecName).index(codec), grey])
-    head += b"".join(number.to_bytes(2, "big") for number in (height, width, len(pictures)))
-    return head + b"".join(len(one).to_bytes(_LENGTH_BYTES, "big") + one for one in packets)
+    return join_group(GroupHead(codec, grey, height, width, len(pictures)), packets)
 
 
 def decode_group(group: bytes) -> list[ImageArray]:
@@ -142,22 +160,29 @@ def decode_group(group: bytes) -> list[ImageArray]:
         Without the extra ``video``.
     """
     av = _import_av()
-    settings, grey, (height, width, n_pictures) = _read_head(group)
-    packets = _read_packets(group)
+    head, packets = split_group(group)
+    settings, coded = GROUP_CODECS[head.codec], coded_size(head.height, head.width)
     try:
-        planes = list(_decode(av, settings, packets, _coded_size(height, width)))
+        planes = list(_decode(av, settings, packets, coded))
     except (av.FFmpegError, ValueError) as error:
         raise InputError(f"group of pictures: damaged {settings.name} data: {error}") from error
-    coded = _coded_size(height, width)
-    if len(planes) != n_pictures or any(one[0].shape != coded for one in planes):
+    if len(planes) != head.n_pictures or any(one[0].shape != coded for one in planes):
         raise InputError(
-            f"group of pictures: got {len(planes)} pictures, expected {n_pictures} of "
-            f"{width} x {height} (damaged?)"
+            f"group of pictures: got {len(planes)} pictures, expected {head.n_pictures} of "
+            f"{head.width} x {head.height} (damaged?)"
         )
-    return [_from_planes(one, height, width, grey) for one in planes]
+    return [from_planes(one, head.height, head.width, grey=head.grey) for one in planes]
 
 
-Planes = tuple[ImageArray, ImageArray, ImageArray]
+def codec_versions() -> str:
+    """Return the version of what encodes and decodes, for provenance and content hashes.
+
+    Raises
+    ------
+    MissingExtraError
+        Without the extra ``video``.
+    """
+    return f"pyav {_import_av().__version__}"
 
 
 def _import_av() -> Any:
@@ -176,7 +201,8 @@ def _settings(codec: str) -> GroupCodec:
     return GROUP_CODECS[codec]
 
 
-def _check_quality(settings: GroupCodec, quality: int) -> None:
+def check_quality(settings: GroupCodec, quality: int) -> None:
+    """Raise ConfigError if a codec has no such quality factor."""
     # SVT-AV1 takes 0 for "not given".
     best = 1 if settings.name == "av1" else 0
     if (
@@ -197,43 +223,9 @@ def _checked(images: Sequence[ImageArray]) -> list[ImageArray]:
     shapes = {picture.shape for picture in pictures}
     if len(shapes) > 1:
         raise ShapeError(f"group of pictures: got shapes {sorted(shapes)}, expected one")
-    if max(pictures[0].shape[:2]) > 0xFFFF:
+    if max(pictures[0].shape[:2]) > LONGEST_SIDE:
         raise ShapeError(f"group of pictures: {pictures[0].shape} is too large")
     return pictures
-
-
-def _coded_size(height: int, width: int) -> tuple[int, int]:
-    """Return the size that is encoded: even, and not below what SVT-AV1 takes."""
-    padded = [max(_SMALLEST_SIDE, side + side % 2) for side in (height, width)]
-    return padded[0], padded[1]
-
-
-def _to_planes(picture: ImageArray) -> Planes:
-    """Return full-range Y, Cb, Cr; the latter at half the size, by the mean of four."""
-    import cv2
-
-    coded_height, coded_width = _coded_size(*picture.shape[:2])
-    below, right = coded_height - picture.shape[0], coded_width - picture.shape[1]
-    padded = cv2.copyMakeBorder(picture, 0, below, 0, right, cv2.BORDER_REPLICATE)
-    half = (coded_width // 2, coded_height // 2)
-    if picture.ndim == 2:
-        neutral = np.full(half[::-1], 128, np.uint8)
-        return cast(Planes, (padded, neutral, neutral))
-    luma, red, blue = cv2.split(cv2.cvtColor(padded, cv2.COLOR_RGB2YCrCb))
-    small = [cv2.resize(plane, half, interpolation=cv2.INTER_AREA) for plane in (blue, red)]
-    return cast(Planes, (luma, *small))
-
-
-def _from_planes(planes: Planes, height: int, width: int, grey: bool) -> ImageArray:
-    import cv2
-
-    luma, blue, red = planes
-    if grey:
-        return np.ascontiguousarray(luma[:height, :width])
-    size = luma.shape[::-1]
-    full = [cv2.resize(plane, size, interpolation=cv2.INTER_LINEAR) for plane in (red, blue)]
-    rgb = cv2.cvtColor(cv2.merge([luma, *full]), cv2.COLOR_YCrCb2RGB)
-    return np.ascontiguousarray(rgb[:height, :width], np.uint8)
 
 
 def _encode(av: Any, settings: GroupCodec, quality: int, planes: list[Planes]) -> list[bytes]:
@@ -244,7 +236,7 @@ def _encode(av: Any, settings: GroupCodec, quality: int, planes: list[Planes]) -
     context.framerate = Fraction(25, 1)
     context.thread_count = 1
     context.gop_size = _LONGEST_GROUP
-    context.options = {**settings.options, "crf": str(quality)}
+    context.options = {**settings.options_for(context.height, context.width), "crf": str(quality)}
     packets = []
     with _quiet_encoder():
         for number, picture in enumerate(planes):
@@ -312,27 +304,6 @@ def _to_arrays(frame: Any) -> Planes:
         for plane in frame.planes
     ]
     return cast(Planes, tuple(array.copy() for array in arrays))
-
-
-def _read_head(group: bytes) -> tuple[GroupCodec, bool, tuple[int, int, int]]:
-    names = get_args(CodecName)
-    if len(group) < _HEAD_BYTES or not group.startswith(_MAGIC) or group[4] >= len(names):
-        raise InputError("group of pictures: these bytes are no group of this program's")
-    height, width, n_pictures = (int.from_bytes(group[i : i + 2], "big") for i in (6, 8, 10))
-    return GROUP_CODECS[names[group[4]]], bool(group[5]), (height, width, n_pictures)
-
-
-def _read_packets(group: bytes) -> list[bytes]:
-    packets, position = [], _HEAD_BYTES
-    while position < len(group):
-        start = position + _LENGTH_BYTES
-        length = int.from_bytes(group[position:start], "big")
-        packet = group[start : start + length]
-        if not length or len(packet) != length:
-            raise InputError("group of pictures: truncated")
-        packets.append(packet)
-        position = start + length
-    return packets
 
 
 _environment = threading.Lock()

@@ -11,8 +11,10 @@ Conventions
   coefficients in all.
 """
 
-from collections.abc import Callable
-from functools import lru_cache
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from types import MappingProxyType
 from typing import cast
 
 import numpy as np
@@ -24,6 +26,8 @@ from retraverse.images.quantisation import STANDARD_TABLES, QuantisationTables
 from retraverse.types import Array, BoolArray, FloatArray, ImageArray
 
 __all__ = [
+    "JPEG_PARTS",
+    "JpegPart",
     "compress",
     "deblock",
     "grid_only",
@@ -239,3 +243,62 @@ def _from_planes(planes: list[FloatArray]) -> ImageArray:
 
 def _to_pixels(values: Array) -> ImageArray:
     return np.asarray(np.clip(np.round(values), 0, 255), np.uint8)
+
+
+@dataclass(frozen=True)
+class JpegPart:
+    """One part of what JPEG does."""
+
+    name: str
+    summary: str
+    """One clause: what is done and what is left alone."""
+    apply: Callable[[ImageArray, int], ImageArray]
+    """(picture, c) -> picture; parts without quantisation do not look at c."""
+
+
+def _only_luminance(picture: ImageArray, c: int) -> ImageArray:
+    return mix_planes(compress(picture, c), picture)
+
+
+def _only_colour(picture: ImageArray, c: int) -> ImageArray:
+    return mix_planes(picture, compress(picture, c))
+
+
+def _in_blocks(picture: ImageArray, _: int, *, n_bands: int) -> ImageArray:
+    return keep_bands(picture, n_bands)
+
+
+def _smooth(picture: ImageArray, _: int, *, n_bands: int) -> ImageArray:
+    return keep_bands_smoothly(picture, n_bands)
+
+
+def _band_parts(n: int) -> tuple[JpegPart, JpegPart]:
+    """Return a block's lowest bands, and the same frequencies of the whole picture."""
+    share = f"{n * (n + 1) // 2} of 64"
+    return (
+        JpegPart(
+            f"{n} bands in blocks",
+            f"{share} coefficients a block, unrounded",
+            partial(_in_blocks, n_bands=n),
+        ),
+        JpegPart(
+            f"{n} bands smooth",
+            f"as many of the whole picture's coefficients, no grid ({share})",
+            partial(_smooth, n_bands=n),
+        ),
+    )
+
+
+_parts = (
+    JpegPart("luminance", "JPEG's luminance with clean colour", _only_luminance),
+    JpegPart("colour", "clean luminance with JPEG's colour", _only_colour),
+    JpegPart("subsampled", "colour at half the size, else clean", lambda p, _: subsample_colour(p)),
+    JpegPart("no colour", "luminance only, else clean", lambda p, _: without_colour(p)),
+    JpegPart("means", "the blocks' means rounded", partial(quantise, details=False)),
+    JpegPart("details", "all but the means rounded", partial(quantise, means=False)),
+    JpegPart("deblocked", "JPEG with its grid smoothed away", deblock),
+    JpegPart("grid", "the clean picture with JPEG's grid added", grid_only),
+    *(part for n in (1, 2, 4) for part in _band_parts(n)),
+)
+JPEG_PARTS: Mapping[str, JpegPart] = MappingProxyType({part.name: part for part in _parts})
+"""Name -> part, in the order of tables."""

@@ -1,126 +1,45 @@
 """Pictures made worse on purpose: resized, then compressed, exactly as in the thesis.
 
+`retraverse.images.worsening` says what is done; this does it.
+
 Conventions
-- Order: decode, resize, compress. What is compressed are the pixels OpenCV decodes; each c
-  starts from them, never from another c's result.
-- ``compression=None`` leaves the picture's own bytes alone (c = 0 of chapter 5); ``0`` is JPEG of
-  quality 100 (c = 0 of chapter 6, where pictures were resized first).
 - A grey file or array stays grey: its JPEG has one plane.
 - Nothing is kept unless a `PictureCache` is given: a frame of `worsened` is made again each time
   its pixels are asked for, the one of `worsen_frame` holds its bytes.
 - A frame's fingerprint names the original's and what was done, so that it is known without
-  encoding; the two ways to the same picture have the same one.
+  encoding; the ways to the same picture have the same one.
+- Groups of a video codec are counted from the first frame given; each picture is taken to weigh
+  its share of the group.
 """
 
-import hashlib
 import threading
 import time
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Literal, get_args
 
 import numpy as np
 
-from retraverse.errors import ConfigError, InputError
-from retraverse.images.decode import (
-    GreyPath,
-    check_array,
-    decode_bgr,
-    decode_grey,
-    decode_native,
-    to_grey,
-    to_rgb,
-)
+from retraverse.errors import InputError
+from retraverse.images.codecs import CodecName, decode_group, encode_group
+from retraverse.images.decode import GreyPath, decode_bgr, decode_grey, to_grey, to_rgb
 from retraverse.images.frame import Frame
-from retraverse.images.jpeg import (
-    Encoder,
-    JpegLibrary,
-    check_compression,
-    encode_jpeg,
-    encoder_versions,
-)
-from retraverse.images.pixels import ArrayPixels, Pixels
+from retraverse.images.jpeg import Encoder, JpegLibrary, encode_jpeg
+from retraverse.images.jpeg_parts import JPEG_PARTS
+from retraverse.images.picture_cache import PictureCache, native_pixels, resized_pixels
+from retraverse.images.pixels import Pixels
 from retraverse.images.traverse import Traverse
+from retraverse.images.worsening import Worsening
 from retraverse.types import ImageArray, IntArray, Progress, no_progress
 
 __all__ = [
-    "PictureCache",
-    "Resizer",
     "WorsenedFrame",
-    "Worsening",
     "frame_bytes",
-    "native_pixels",
-    "resize_square",
     "worsen_each",
     "worsen_frame",
+    "worsen_group",
     "worsened",
 ]
-
-Resizer = Literal["pillow", "opencv"]
-"""``pillow``: `Image.resize` with its default filter, bicubic with antialiasing (chapter 7);
-``opencv``: `cv2.resize` with its default, bilinear without antialiasing (chapter 6)."""
-_FILTERS: dict[str, str] = {"pillow": "bicubic", "opencv": "bilinear"}
-LARGEST_SIDE = 16384
-
-
-@dataclass(frozen=True)
-class Worsening:
-    """What is done to every picture of a drive."""
-
-    resize: int | None = None
-    """Side of the square in pixels, whatever the picture's shape was; None = as it is."""
-    resizer: Resizer = "pillow"
-    """Whose resizing; no matter without `resize`."""
-    compression: int | None = None
-    """c of the thesis, 0 to 99 (JPEG quality 100 - c); None = not encoded."""
-    encoder: Encoder = field(default_factory=Encoder)
-    """How the JPEG is written; no matter without `compression`."""
-
-    def __post_init__(self) -> None:
-        """Check every range."""
-        if self.resize is not None and not 1 <= self.resize <= LARGEST_SIDE:
-            raise ConfigError(f"resize: got {self.resize}, expected 1 to {LARGEST_SIDE} pixels")
-        if self.resizer not in get_args(Resizer):
-            raise ConfigError(
-                f"resizer: got {self.resizer!r}, expected one of {', '.join(get_args(Resizer))}"
-            )
-        if self.compression is not None:
-            check_compression(self.compression)
-
-    @property
-    def is_nothing(self) -> bool:
-        """Whether pictures stay as they are."""
-        return self.resize is None and self.compression is None
-
-    @property
-    def label(self) -> str:
-        """What is done, in words, for records: two equal labels mean the same pictures."""
-        words = []
-        if self.resize is not None:
-            words.append(f"resized to {self.resize} px by {self.resizer_label}")
-        if self.compression is not None:
-            words.append(f"JPEG c = {self.compression} by {self.encoder.label}")
-        return ", ".join(words) or "as it is"
-
-    @property
-    def resizer_label(self) -> str:
-        """Library and filter: ``"pillow bicubic"``; empty without resizing."""
-        return f"{self.resizer} {_FILTERS[self.resizer]}" if self.resize is not None else ""
-
-    def fingerprint(self, original: bytes) -> bytes:
-        """Return what identifies the result, from the fingerprint of the original frame.
-
-        Library versions count: the same options may give other bytes by another version.
-        """
-        if self.is_nothing:
-            return original
-        # OpenCV decodes, whoever resizes and encodes.
-        libraries: set[JpegLibrary] = {"opencv"}
-        libraries |= {self.resizer} if self.resize is not None else set()
-        libraries |= {self.encoder.library} if self.compression is not None else set()
-        versions = ", ".join(map(encoder_versions, sorted(libraries)))
-        return f"{self.label} ({versions}) of {hashlib.sha256(original).hexdigest()}".encode()
 
 
 @dataclass(frozen=True)
@@ -130,50 +49,10 @@ class WorsenedFrame:
     frame: Frame
     """Holds the new bytes; name, number and path are the original's."""
     n_bytes: int
-    """Of the encoded picture. Where nothing was encoded: of the original file if it was not
-    resized, else of the raw pixels."""
+    """Of the encoded picture, or its share of its group. Where nothing was encoded: of the original
+    file if it was not resized, else of the raw pixels."""
     compress_s: float
     """t_c: seconds to encode, decoding and resizing not counted; 0 where nothing was encoded."""
-
-
-class PictureCache:
-    """Decoded (and resized) pictures of the last frames asked for, up to so many bytes.
-
-    Give one cache to all compressions of a drive and each picture is decoded once. A file that
-    changes meanwhile is not noticed, so make a new cache for a new run. Thread-safe.
-
-    Parameters
-    ----------
-    max_bytes : int
-        Of pixels; the oldest go first. One picture is kept whatever its size.
-    """
-
-    def __init__(self, max_bytes: int = 64 * 2**20) -> None:
-        self.max_bytes = max_bytes
-        self.n_decoded = 0
-        """How many pictures were not found here and had to be made."""
-        self._lock = threading.Lock()
-        # Keyed by identity; the pixel source is kept too, so that its id cannot be given away.
-        self._kept: dict[tuple[int, int | None, str], tuple[Pixels, ImageArray]] = {}
-        self._n_bytes = 0
-
-    def pixels(self, source: Pixels, worsening: Worsening) -> ImageArray:
-        """Return the resized pixels of a source, shared: not to be written to."""
-        key = (id(source), worsening.resize, worsening.resizer if worsening.resize else "")
-        with self._lock:
-            kept = self._kept.pop(key, None)
-            if kept is not None:
-                self._kept[key] = kept  # now the youngest
-                return kept[1]
-        picture = _resized(source, worsening)
-        with self._lock:
-            self.n_decoded += 1
-            if key not in self._kept:
-                self._kept[key] = (source, picture)
-                self._n_bytes += picture.nbytes
-            while len(self._kept) > 1 and self._n_bytes > self.max_bytes:
-                self._n_bytes -= self._kept.pop(next(iter(self._kept)))[1].nbytes
-        return picture
 
 
 def worsened(
@@ -194,12 +73,15 @@ def worsened(
     -------
     Traverse
         Names and frame numbers stay, `source` says what was done. ``frame.encoded()`` is the
-        JPEG file; None where pictures are only resized.
+        JPEG file; None where there is none.
     """
     if worsening.is_nothing:
         return traverse
+    listed = tuple(traverse)
+    groups = _groups(listed, worsening, cache)
     frames = tuple(
-        replace(frame, pixels=_LazyPixels(frame.pixels, worsening, cache)) for frame in traverse
+        replace(frame, pixels=_LazyPixels(frame.pixels, worsening, cache, group, place))
+        for frame, (group, place) in zip(listed, groups, strict=True)
     )
     return replace(traverse, source=f"{traverse.source}, {worsening.label}", frames=frames)
 
@@ -240,6 +122,40 @@ def worsen_each(
         return [_worsen(frame, worsening, cache) for worsening in worsenings]
 
 
+def worsen_group(
+    frames: Sequence[Frame], worsening: Worsening, *, cache: PictureCache | None = None
+) -> list[WorsenedFrame]:
+    """Return pictures sent together as one group of a video codec, however many they are.
+
+    Parameters
+    ----------
+    frames : sequence of Frame
+        At least one; all of one size once they are resized.
+    worsening : Worsening
+        Its `video` says how.
+    cache : PictureCache, optional
+
+    Raises
+    ------
+    FrameReadError
+        If a frame cannot be read.
+    InputError
+        If the pictures differ in size, or the encoder refuses them.
+    MissingExtraError
+        Without the extra ``video``.
+    """
+    sent, seconds = _as_group(frames, worsening, cache or PictureCache())
+    sizes = np.diff(np.linspace(0, len(sent), len(frames) + 1).round().astype(int)).tolist()
+    return [
+        WorsenedFrame(
+            replace(frame, pixels=_HeldPixels(None, picture, _identity(frame, worsening))),
+            n_bytes,
+            seconds / len(frames),
+        )
+        for frame, picture, n_bytes in zip(frames, decode_group(sent), sizes, strict=True)
+    ]
+
+
 def frame_bytes(traverse: Iterable[Frame], *, progress: Progress = no_progress) -> IntArray:
     """Return the size in bytes of every encoded picture of a drive, int64 (N,).
 
@@ -257,35 +173,6 @@ def frame_bytes(traverse: Iterable[Frame], *, progress: Progress = no_progress) 
     return np.asarray(sizes, np.int64)
 
 
-def native_pixels(source: Pixels) -> ImageArray:
-    """Return the pixels as the source has them: (height, width) if grey, else RGB.
-
-    Raises
-    ------
-    FrameReadError
-        If they cannot be read; the reason without the name.
-    """
-    encoded = source.encoded()
-    if encoded is not None:
-        native = decode_native(encoded)
-        return native if native.ndim == 2 else to_rgb(native, "bgr")
-    if isinstance(source, ArrayPixels):
-        picture = check_array(source.items[source.position])
-        return picture if picture.ndim == 2 else to_rgb(picture, source.colour_order)
-    return source.rgb()
-
-
-def resize_square(picture: ImageArray, side: int, resizer: Resizer) -> ImageArray:
-    """Return a grey or RGB picture as a square, by the library's default filter."""
-    if resizer == "opencv":
-        import cv2
-
-        return np.asarray(cv2.resize(picture, (side, side)), np.uint8)
-    from PIL import Image
-
-    return np.asarray(Image.fromarray(picture).resize((side, side)))
-
-
 @dataclass(frozen=True, slots=True)
 class _LazyPixels:
     """A worse picture that is made when asked for."""
@@ -293,10 +180,13 @@ class _LazyPixels:
     original: Pixels
     worsening: Worsening
     cache: PictureCache | None
+    group: "_LazyGroup | None"
+    place: int
+    """In its group."""
 
     def encoded(self) -> bytes | None:
-        """Return the JPEG file, None where there is only resizing."""
-        if self.worsening.compression is None:
+        """Return the JPEG file, None where there is none."""
+        if self.worsening.compression is None or not self.worsening.is_file:
             return None
         return encode_jpeg(self._resized(), self.worsening.compression, self.worsening.encoder)
 
@@ -314,12 +204,47 @@ class _LazyPixels:
 
     def _resized(self) -> ImageArray:
         if self.cache is None:
-            return _resized(self.original, self.worsening)
+            return resized_pixels(self.original, self.worsening)
         return self.cache.pixels(self.original, self.worsening)
 
     def _made(self) -> "_HeldPixels":
         encoded = self.encoded()
-        return _HeldPixels(encoded, None if encoded is not None else self._resized(), b"")
+        if encoded is not None:
+            return _HeldPixels(encoded, None, b"")
+        if self.group is not None:
+            return _HeldPixels(None, self.group.pictures()[self.place], b"")
+        return _HeldPixels(None, _damaged(self._resized(), self.worsening), b"")
+
+
+class _LazyGroup:
+    """Some pictures of a drive that are sent together when one of them is asked for."""
+
+    def __init__(
+        self, frames: Sequence[Frame], worsening: Worsening, cache: PictureCache | None
+    ) -> None:
+        self._frames, self._worsening, self._cache = frames, worsening, cache
+        self._lock = threading.Lock()
+        self._pictures: list[ImageArray] = []
+
+    def pictures(self) -> list[ImageArray]:
+        """Return the pictures as they arrive; made once."""
+        with self._lock:
+            if not self._pictures:
+                cache = self._cache or PictureCache()
+                sent, _ = _as_group(self._frames, self._worsening, cache)
+                self._pictures = decode_group(sent)
+            return self._pictures
+
+
+def _groups(
+    frames: Sequence[Frame], worsening: Worsening, cache: PictureCache | None
+) -> Iterator[tuple[_LazyGroup | None, int]]:
+    """Yield each frame's group and its place there."""
+    length = 1 if worsening.video is None else worsening.video.length
+    for start in range(0, len(frames), length):
+        some = frames[start : start + length]
+        group = None if worsening.video is None else _LazyGroup(some, worsening, cache)
+        yield from ((group, place) for place in range(len(some)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -353,22 +278,17 @@ class _HeldPixels:
         return self.identity
 
 
-def _resized(source: Pixels, worsening: Worsening) -> ImageArray:
-    picture = native_pixels(source)
-    if worsening.resize is None:
-        return picture
-    return resize_square(picture, worsening.resize, worsening.resizer)
-
-
 def _worsen(frame: Frame, worsening: Worsening, cache: PictureCache) -> WorsenedFrame:
     if worsening.is_nothing:
         own = frame.pixels.encoded()
         n_bytes = native_pixels(frame.pixels).nbytes if own is None else len(own)
         return WorsenedFrame(frame, n_bytes, 0.0)
+    if worsening.video is not None:
+        return worsen_group((frame,), worsening, cache=cache)[0]
     picture = cache.pixels(frame.pixels, worsening)
-    identity = worsening.fingerprint(frame.pixels.fingerprint())
-    if worsening.compression is None:
-        held = _HeldPixels(None, picture, identity)
+    identity = _identity(frame, worsening)
+    if worsening.compression is None or not worsening.is_file:
+        held = _HeldPixels(None, _damaged(picture, worsening), identity)
         return WorsenedFrame(replace(frame, pixels=held), picture.nbytes, 0.0)
     _warm(worsening.encoder.library)
     started = time.perf_counter()
@@ -378,10 +298,42 @@ def _worsen(frame: Frame, worsening: Worsening, cache: PictureCache) -> Worsened
     return WorsenedFrame(replace(frame, pixels=held), len(file), compress_s)
 
 
+def _damaged(picture: ImageArray, worsening: Worsening) -> ImageArray:
+    """Return a picture with one part of JPEG's damage, if one is asked for."""
+    if not worsening.part or worsening.compression is None:
+        return picture
+    return JPEG_PARTS[worsening.part].apply(picture, worsening.compression)
+
+
+def _as_group(
+    frames: Sequence[Frame], worsening: Worsening, cache: PictureCache
+) -> tuple[bytes, float]:
+    """Return pictures as a group, and the seconds that took."""
+    video = worsening.video
+    assert video is not None
+    pictures = []
+    for frame in frames:
+        with frame._naming():
+            pictures.append(cache.pixels(frame.pixels, worsening))
+    _warm_codec(video.codec)
+    started = time.perf_counter()
+    sent = encode_group(pictures, video.codec, video.quality)
+    return sent, time.perf_counter() - started
+
+
+def _identity(frame: Frame, worsening: Worsening) -> bytes:
+    return worsening.fingerprint(frame.pixels.fingerprint())
+
+
 @lru_cache
 def _warm(library: JpegLibrary) -> None:
     """Encode once without a clock: the first call of a process also imports."""
     encode_jpeg(np.zeros((8, 8), np.uint8), 50, Encoder(library=library))
+
+
+@lru_cache
+def _warm_codec(codec: CodecName) -> None:
+    encode_group([np.zeros((64, 64), np.uint8)], codec)
 
 
 def _size(frame: Frame) -> int:

@@ -33,7 +33,7 @@ from retraverse.matching.dynamic_length import GrowthRule, Window, dynamic_windo
 from retraverse.matching.pairwise import has_descriptor
 from retraverse.matching.self_similarity import Sample, sample_map
 from retraverse.techniques import Descriptions, Technique
-from retraverse.techniques.picture_entropy import picture_entropy
+from retraverse.techniques.handmade.picture_entropy import picture_entropy
 from retraverse.types import Array, FloatArray, Progress, no_progress
 
 __all__ = [

@@ -2,6 +2,7 @@
 
 All that several runs need of a frame is made once: it is read once, decoded once for each size,
 compressed once for each c, decoded once for each grey path, and described once by each technique.
+Frames that go into one group of a video codec are encoded together.
 A technique that fails on a frame spoils its own results and nobody else's.
 """
 
@@ -16,11 +17,16 @@ import numpy as np
 
 from retraverse.errors import InputError
 from retraverse.images import Frame, GreyPath
+from retraverse.images.bare_jpeg import TableSet, strip_tables
+from retraverse.images.jpeg import Encoder
+from retraverse.images.picture_cache import PictureCache
 from retraverse.images.pixels import ArrayPixels, Pixels
-from retraverse.images.worsen import Worsening, worsen_each
+from retraverse.images.worsen import WorsenedFrame, worsen_each, worsen_group
+from retraverse.images.worsening import Worsening
+from retraverse.studies.legibility import smallest_legible_height
 from retraverse.studies.plan import TechniqueChoice
 from retraverse.techniques import Description, Descriptions, Technique
-from retraverse.techniques.picture_entropy import picture_entropy
+from retraverse.techniques.handmade.picture_entropy import picture_entropy
 from retraverse.types import Array, ImageArray
 
 __all__ = [
@@ -33,7 +39,7 @@ __all__ = [
 ]
 
 BATCH_FRAMES = 8
-"""Frames whose pixels are held at once, at every c."""
+"""Frames whose pixels are held at once, at every c; more where a group of pictures is longer."""
 TIMES = "describe_s"
 """Name of the array of seconds (t_e of every frame) beside a technique's own arrays."""
 
@@ -50,6 +56,8 @@ class Wanted:
     """Who describes them; None = their sizes, t_c and entropy."""
     entropy: bool = False
     """Whether the pictures' entropy is measured (without a technique)."""
+    legibility: bool = False
+    """Whether nothing but what can still be read is measured, in scenes of our own."""
 
 
 @dataclass(frozen=True)
@@ -78,8 +86,9 @@ def describe_task(task: DescribeTask) -> Described:
     """Return the entries of a task; what goes wrong is in `Described.errors`, not raised."""
     makers = {wanted.key: _maker(wanted) for wanted in task.wanted}
     try:
-        for start in range(0, len(task.frames), BATCH_FRAMES):
-            batch = slice(start, start + BATCH_FRAMES)
+        size = _batch_frames(task.wanted)
+        for start in range(0, len(task.frames), size):
+            batch = slice(start, start + size)
             _add_batch(task.frames[batch], task.digests[batch], makers)
     except Exception as error:
         # Nobody can use a frame that cannot be read.
@@ -106,25 +115,42 @@ _warm: set[int] = set()
 
 
 class _PictureMaker:
-    """Sizes, t_c and entropy of pictures."""
+    """Sizes (with and without constant tables), t_c and entropy of pictures."""
 
     def __init__(self, wanted: Wanted) -> None:
         self.wanted = wanted
         self.error = ""
-        self._rows: list[tuple[int, float, float]] = []
+        self._rows: list[tuple[int, int, float, float]] = []
 
     def add(self, frames: Sequence["_Picture"]) -> None:
         for picture in frames:
             entropy = picture_entropy(picture.frame.grey()) if self.wanted.entropy else np.nan
-            self._rows.append((picture.n_bytes, picture.compress_s, entropy))
+            n_bare = _bare_bytes(picture.frame, self.wanted.worsening)
+            self._rows.append((picture.n_bytes, n_bare, picture.compress_s, entropy))
 
     def arrays(self) -> dict[str, Array]:
-        n_bytes, compress_s, entropy = zip(*self._rows, strict=True)
+        n_bytes, n_bare, compress_s, entropy = zip(*self._rows, strict=True)
         return {
             "n_bytes": np.array(n_bytes, np.int64),
+            "n_bare_bytes": np.array(n_bare, np.int64),
             "compress_s": np.array(compress_s, np.float64),
             "entropy": np.array(entropy, np.float64),
         }
+
+
+class _LegibilityMaker:
+    """What can be read in scenes of our own that are made worse like a drive; needs no frames."""
+
+    error = ""
+
+    def __init__(self, wanted: Wanted) -> None:
+        self.wanted = wanted
+
+    def add(self, frames: Sequence["_Picture"]) -> None:
+        pass
+
+    def arrays(self) -> dict[str, Array]:
+        return {"height": np.array([smallest_legible_height(self.wanted.worsening)])}
 
 
 class _DescriptionMaker:
@@ -167,7 +193,12 @@ class _DescriptionMaker:
         return {**stacked.arrays, TIMES: np.array(self._seconds, np.float64)}
 
 
-def _maker(wanted: Wanted) -> _PictureMaker | _DescriptionMaker:
+_Maker = _PictureMaker | _LegibilityMaker | _DescriptionMaker
+
+
+def _maker(wanted: Wanted) -> _Maker:
+    if wanted.legibility:
+        return _LegibilityMaker(wanted)
     if wanted.technique is None:
         return _PictureMaker(wanted)
     try:
@@ -184,36 +215,66 @@ class _Picture:
     n_bytes: int
     compress_s: float
 
+    @classmethod
+    def of(cls, worse: WorsenedFrame) -> "_Picture":
+        """Return it as pixels of which nothing is decoded twice."""
+        frame = replace(worse.frame, pixels=_Remembered(worse.frame.pixels))
+        return cls(frame, worse.n_bytes, worse.compress_s)
+
+
+def _batch_frames(wanted: Sequence[Wanted]) -> int:
+    """Return how many frames are held at once: whole groups of pictures."""
+    lengths = [one.worsening.video.length for one in wanted if one.worsening.video is not None]
+    return max([BATCH_FRAMES, *lengths])
+
 
 def _add_batch(
-    frames: Sequence[Frame],
-    digests: Sequence[bytes],
-    makers: Mapping[str, _PictureMaker | _DescriptionMaker],
+    frames: Sequence[Frame], digests: Sequence[bytes], makers: Mapping[str, _Maker]
 ) -> None:
     ways = list(dict.fromkeys(maker.wanted.worsening for maker in makers.values()))
-    rows = [_worsen(*pair, ways) for pair in zip(frames, digests, strict=True)]
-    for column, way in enumerate(ways):
-        pictures = [row[column] for row in rows]
+    known = [_known(*pair) for pair in zip(frames, digests, strict=True)]
+    for way, pictures in _worsen_all(known, ways).items():
         for maker in makers.values():
             if maker.wanted.worsening == way:
                 maker.add(pictures)
 
 
-def _worsen(frame: Frame, digest: bytes, ways: Sequence[Worsening]) -> list[_Picture]:
-    """Return a frame made worse in all ways, if it still is the one the keys were made with."""
+def _known(frame: Frame, digest: bytes) -> Frame:
+    """Return a frame, read, if it still is the one the keys were made with."""
     read = _read_once(frame.pixels)
     if hashlib.sha256(replace(frame, pixels=read).fingerprint()).digest() != digest:
         raise InputError(f"{frame.name} changed while the study ran; run it again")
     # From here on its digest stands for it: hashed once, not once for each c.
-    known = replace(frame, pixels=_identified(read, digest))
-    return [
-        _Picture(
-            replace(worse.frame, pixels=_Remembered(worse.frame.pixels)),
-            worse.n_bytes,
-            worse.compress_s,
-        )
-        for worse in worsen_each(known, ways)
-    ]
+    return replace(frame, pixels=_identified(read, digest))
+
+
+def _worsen_all(
+    frames: Sequence[Frame], ways: Sequence[Worsening]
+) -> dict[Worsening, list[_Picture]]:
+    """Return frames made worse in all ways, decoded once for each size."""
+    cache = PictureCache()
+    alone = [way for way in ways if way.video is None]
+    rows = [worsen_each(frame, alone, cache=cache) for frame in frames]
+    made = {way: [row[column] for row in rows] for column, way in enumerate(alone)}
+    for way in ways:
+        if way.video is not None:
+            starts = range(0, len(frames), way.video.length)
+            groups = [frames[start : start + way.video.length] for start in starts]
+            made[way] = [one for group in groups for one in worsen_group(group, way, cache=cache)]
+    return {way: list(map(_Picture.of, worse)) for way, worse in made.items()}
+
+
+@lru_cache(maxsize=64)
+def _tables(encoder: Encoder, compression: int) -> TableSet:
+    return TableSet.for_encoder(encoder, [compression])
+
+
+def _bare_bytes(frame: Frame, worsening: Worsening) -> int:
+    """Return the size of a picture without its constant tables, -1 where it is no JPEG of ours."""
+    encoded = frame.encoded() if worsening.is_file else None
+    if encoded is None or worsening.compression is None:
+        return -1
+    return len(strip_tables(encoded, _tables(worsening.encoder, worsening.compression)))
 
 
 def _read_once(pixels: Pixels) -> Pixels:

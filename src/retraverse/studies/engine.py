@@ -11,6 +11,7 @@ killed study starts again with what was not done.
 """
 
 import itertools
+import math
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -22,6 +23,7 @@ from retraverse.errors import InputError
 from retraverse.maps.describe import available_cores
 from retraverse.studies.cache import StudyCache
 from retraverse.studies.describe_task import Described
+from retraverse.studies.empty_roi import EmptyRoiCount
 from retraverse.studies.match_task import InHand, Matched, MatchTask, Source, failed_runs
 from retraverse.studies.plan import StudyPlan
 from retraverse.studies.plan_checks import PlanError, plan_problems
@@ -112,7 +114,7 @@ def run_study(
     if problems:
         raise PlanError(plan.name, problems)
     with StudyFolder.opened(Path(folder)) as study:
-        study.write_plan(plan.text)
+        study.write_plan(plan)
         # Absolute: workers of a cluster may run in another folder.
         store = StudyCache((Path(cache) if cache is not None else study.cache).absolute())
         work = plan_work(plan, store, study, progress)
@@ -143,6 +145,7 @@ class _Run:
         self._errors: dict[str, str] = {}
         self._schedule = Schedule(work)
         self._provenance = RunProvenance()
+        self._empty_roi = EmptyRoiCount()
         self._pictures: dict[tuple[int, str, bool], _Pictures] = {}
         self._flushed = time.monotonic()
 
@@ -155,6 +158,7 @@ class _Run:
                 self._do_tasks(pool, plan.name, progress)
             finally:
                 pool.close()
+                self._empty_roi.say()
         self._study.flush()
 
     def _do_tasks(self, pool: Pool, name: str, progress: Progress) -> None:
@@ -203,7 +207,9 @@ class _Run:
 
     def _take_matched(self, number: int, outcome: Matched) -> None:
         if outcome.matrix is not None:
-            self._store.save(self._work.jobs[number].matrix_key, outcome.matrix)
+            job = self._work.jobs[number]
+            self._store.save(job.matrix_key, outcome.matrix)
+            self._empty_roi.add(job.technique, outcome.n_empty_roi, len(job.query.traverse))
         self._keep(outcome.records)
 
     def _keep(self, records: Iterable[RunRecord]) -> None:
@@ -236,7 +242,9 @@ class _Run:
             query_bytes_total=query.bytes_total,
             reference_bytes_total=reference.bytes_total,
             compress_s=query.compress_s,
-            entropy_query_mean=query.entropy_mean if job.with_entropy else float("nan"),
+            query_bare_bytes_mean=query.bare_bytes_mean,
+            entropy_query_mean=query.entropy_mean if job.with_entropy else math.nan,
+            legible_height=self._legible_height(job) if job.with_legibility else math.nan,
         )
         sources = [
             tuple(
@@ -262,6 +270,9 @@ class _Run:
         entry = self._store.entry(key)
         return entry if by_path else InHand(entry.load())
 
+    def _legible_height(self, job: Job) -> float:
+        return float(self._store.entry(job.legibility_key).load()["height"][0])
+
     def _side(self, job: Job, side: int) -> "_Pictures":
         """Return the sizes and times of one drive's pictures; read once for all jobs."""
         drive, worsening = job.sides[side]
@@ -279,19 +290,21 @@ class _Pictures:
 
     bytes_mean: float
     bytes_total: int
+    bare_bytes_mean: float
     compress_s: float
     entropy_mean: float
     entropy: tuple[float, ...]
 
     @classmethod
     def of(cls, pieces: list[dict[str, Array]]) -> "_Pictures":
-        n_bytes, compress_s, entropy = (
+        n_bytes, n_bare, compress_s, entropy = (
             np.concatenate([piece[name] for piece in pieces])
-            for name in ("n_bytes", "compress_s", "entropy")
+            for name in ("n_bytes", "n_bare_bytes", "compress_s", "entropy")
         )
         return cls(
             bytes_mean=float(n_bytes.mean()),
             bytes_total=int(n_bytes.sum()),
+            bare_bytes_mean=float(n_bare.mean()) if n_bare.min() >= 0 else math.nan,
             compress_s=float(np.median(compress_s)),
             entropy_mean=float(entropy.mean()),
             entropy=tuple(entropy.tolist()),

@@ -13,7 +13,7 @@ from pathlib import Path
 from retraverse.studies.cache import StudyCache
 from retraverse.studies.describe_task import DescribeTask, describe_task, made_technique
 from retraverse.studies.plan import StudyPlan
-from retraverse.studies.schedule import match_s
+from retraverse.studies.schedule import COST_S, describe_cost, match_s
 from retraverse.studies.work import Work, plan_work
 from retraverse.types import Progress, no_progress
 
@@ -78,6 +78,9 @@ def _try_tasks(work: Work, progress: Progress) -> tuple[float, list[str]]:
     problems: list[str] = []
     total = 0.0
     for task in progress(work.tasks, total=len(work.tasks), label="trying"):
+        if not task.frames:
+            total += describe_cost(task) * COST_S
+            continue
         # Pictures of one drive take alike; so does all that is wanted of them.
         kind = (task.frames[0].path and task.frames[0].path.parent, _ways(task))
         if kind not in seconds_of:

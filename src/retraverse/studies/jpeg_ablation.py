@@ -5,17 +5,16 @@ the technique as it is. A part's *cost* is the change of accuracy against the cl
 by window, with a paired bootstrap interval.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
 from retraverse.datasets import GroundTruth
 from retraverse.errors import InputError
 from retraverse.images import Frame, Traverse
-from retraverse.images import jpeg_parts as parts
 from retraverse.images.jpeg import check_compression
+from retraverse.images.jpeg_parts import JPEG_PARTS, JpegPart, compress
 from retraverse.maps.describe import describe_traverse
 from retraverse.matching import match_similarity
 from retraverse.metrics import Interval, bootstrap_interval
@@ -23,21 +22,10 @@ from retraverse.metrics.checks import Float64Array
 from retraverse.techniques import Descriptions, Technique
 from retraverse.types import FloatArray, ImageArray, Progress, no_progress
 
-__all__ = ["JPEG_PARTS", "AblationPoint", "JpegPart", "ablate"]
+__all__ = ["ABLATED_PARTS", "AblationPoint", "ablate"]
 
 BLOCK_LENGTH = 10
 """Neighbouring windows the bootstrap draws together."""
-
-
-@dataclass(frozen=True)
-class JpegPart:
-    """One part of what JPEG does."""
-
-    name: str
-    summary: str
-    """One clause: what is done and what is left alone."""
-    apply: Callable[[ImageArray, int], ImageArray]
-    """(picture, c) -> picture; parts without quantisation do not look at c."""
 
 
 @dataclass(frozen=True)
@@ -56,51 +44,10 @@ class AblationPoint:
     """Whether each window found its place, (W,)."""
 
 
-def _only_luminance(picture: ImageArray, c: int) -> ImageArray:
-    return parts.mix_planes(parts.compress(picture, c), picture)
-
-
-def _only_colour(picture: ImageArray, c: int) -> ImageArray:
-    return parts.mix_planes(picture, parts.compress(picture, c))
-
-
-def _keep_bands(picture: ImageArray, _: int, *, n_bands: int) -> ImageArray:
-    return parts.keep_bands(picture, n_bands)
-
-
-def _keep_bands_smoothly(picture: ImageArray, _: int, *, n_bands: int) -> ImageArray:
-    return parts.keep_bands_smoothly(picture, n_bands)
-
-
-JPEG_PARTS: tuple[JpegPart, ...] = (
+ABLATED_PARTS: tuple[JpegPart, ...] = (
     JpegPart("clean", "nothing", lambda picture, _: picture),
-    JpegPart("jpeg", "all of JPEG at this c", parts.compress),
-    JpegPart("luminance", "JPEG's luminance with clean colour", _only_luminance),
-    JpegPart("colour", "clean luminance with JPEG's colour", _only_colour),
-    JpegPart(
-        "subsampled", "colour at half the size, else clean", lambda p, _: parts.subsample_colour(p)
-    ),
-    JpegPart("no colour", "luminance only, else clean", lambda p, _: parts.without_colour(p)),
-    JpegPart("means", "the blocks' means rounded", partial(parts.quantise, details=False)),
-    JpegPart("details", "all but the means rounded", partial(parts.quantise, means=False)),
-    JpegPart("deblocked", "JPEG with its grid smoothed away", parts.deblock),
-    JpegPart("grid", "the clean picture with JPEG's grid added", parts.grid_only),
-    *(
-        part
-        for n in (1, 2, 4)
-        for part in (
-            JpegPart(
-                f"{n} bands in blocks",
-                f"{n * (n + 1) // 2} of 64 coefficients a block, unrounded",
-                partial(_keep_bands, n_bands=n),
-            ),
-            JpegPart(
-                f"{n} bands smooth",
-                f"as many of the whole picture's coefficients, no grid ({n * (n + 1) // 2} of 64)",
-                partial(_keep_bands_smoothly, n_bands=n),
-            ),
-        )
-    ),
+    JpegPart("jpeg", "all of JPEG at this c", compress),
+    *JPEG_PARTS.values(),
 )
 """Every part, the clean picture first."""
 
@@ -113,7 +60,7 @@ def ablate(
     *,
     compression: int = 97,
     sequence_lengths: Sequence[int] = (1, 10),
-    chosen: Iterable[JpegPart] = JPEG_PARTS,
+    chosen: Iterable[JpegPart] = ABLATED_PARTS,
     progress: Progress = no_progress,
 ) -> list[AblationPoint]:
     """Return what every part of JPEG costs techniques on one pair of drives.
@@ -158,11 +105,11 @@ def ablate(
                 found[name, length] = _correct(scores, truth, length)
         return found
 
-    clean = correct(JPEG_PARTS[0])
+    clean = correct(ABLATED_PARTS[0])
     listed = list(chosen)
     points = []
     for part in progress(listed, total=len(listed), label="parts of JPEG"):
-        found = clean if part is JPEG_PARTS[0] else correct(part)
+        found = clean if part is ABLATED_PARTS[0] else correct(part)
         points += [
             _point(part, name, length, hit, clean[name, length])
             for (name, length), hit in found.items()

@@ -40,6 +40,7 @@ from retraverse.studies.plan import MatcherChoice, TechniqueChoice
 from retraverse.studies.records import RunRecord, Status
 from retraverse.studies.window_answers import Answers, answer_windows, timed_answers
 from retraverse.techniques import Descriptions, Technique
+from retraverse.techniques.handmade.regional_hog import RegionalHog
 from retraverse.types import Array, FloatArray
 
 __all__ = [
@@ -114,6 +115,8 @@ class Matched:
     records: tuple[RunRecord, ...]
     matrix: Mapping[str, Array] | None
     """The cache entry of the matrix, if it was made here."""
+    n_empty_roi: int = 0
+    """Query pictures without a region of interest, if the matrix was made here."""
 
 
 def is_readable(task: MatchTask) -> bool:
@@ -148,7 +151,7 @@ def match_task(task: MatchTask) -> Matched:
             records.append(_run(pair, spec))
         except Exception as error:
             records.extend(failed_runs(task.base, [spec], one_line_reason(error)))
-    return Matched(tuple(records), pair.made)
+    return Matched(tuple(records), pair.made, pair.n_empty_roi)
 
 
 class _Pair:
@@ -158,9 +161,13 @@ class _Pair:
         self.task = task
         self.technique: Technique = made_technique(task.technique)
         self.made: Mapping[str, Array] | None = None
+        self.n_empty_roi = 0
         self._route: RouteMap | None = None
         self._queries: Descriptions | None = None
         self._answers: dict[SequenceLength, Answers | Exception] | None = None
+        if isinstance(self.technique, RegionalHog):
+            # Whoever gives out the tasks says it once for all of them.
+            self.technique.warns_of_empty_roi = False
         entry = self._make() if task.matrix is None else task.matrix.load()
         self.scores: FloatArray = entry["similarity"]
         self.row_s = float(entry["row_s"])
@@ -207,6 +214,8 @@ class _Pair:
         scores = similarity(queries, route)
         row_s = (time.perf_counter() - began) / len(queries)
         described = has_descriptor(queries)
+        if isinstance(self.technique, RegionalHog):
+            self.n_empty_roi = int(self.technique.empty_roi(queries).sum())
         self.made = {
             "similarity": scores,
             "row_s": np.array(row_s),

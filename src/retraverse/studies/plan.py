@@ -7,11 +7,12 @@ parameters read and ranges checked before anything runs.
 import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal
 
 from retraverse.datasets.known import Dataset
 from retraverse.errors import ConfigError
-from retraverse.images.worsen import Worsening
+from retraverse.images.worsening import Worsening
 from retraverse.matching import Matcher, SequenceLength
 from retraverse.matching.matchers import describe_matcher
 from retraverse.matching.matchers import matcher as matcher_of_name
@@ -19,15 +20,19 @@ from retraverse.techniques import Technique
 from retraverse.techniques import technique as technique_of_name
 
 __all__ = [
+    "CHUNK_FRAMES",
     "RESIZED",
     "MatcherChoice",
     "PairRule",
     "PicturePair",
+    "PlanOrigin",
     "StudyPlan",
     "TechniqueChoice",
     "compression_pairs",
 ]
 
+CHUNK_FRAMES = 32
+"""Frames that are described as one task, and kept as one cache entry."""
 RESIZED = "resized"
 """As a technique's parameter: the side the pictures were resized to (chapter 7's resolution)."""
 
@@ -101,6 +106,16 @@ class PicturePair:
 
 
 @dataclass(frozen=True)
+class PlanOrigin:
+    """Where the paths of a plan's text start from."""
+
+    root: Path
+    """The plan's folder, absolute."""
+    data: Path | None = None
+    """The data root that was given in place of the plan's, absolute."""
+
+
+@dataclass(frozen=True)
 class StudyPlan:
     """Everything a study runs."""
 
@@ -116,12 +131,16 @@ class StudyPlan:
     """Chapter of the thesis, "" if none."""
     entropy: bool = False
     """Whether the entropy of the query pictures is measured (figure 5.4)."""
+    legibility: bool = False
+    """Whether it is measured how large writing must be to be read in query pictures."""
     modules: tuple[str, ...] = ()
     """Python modules imported first: they may register techniques and matchers of one's own."""
     missing: tuple[str, ...] = ()
     """Datasets asked for that are not here; each gets a record that says so."""
     text: str = field(default="", repr=False)
     """The TOML it was read from, "" if it was made in Python."""
+    origin: PlanOrigin | None = field(default=None, repr=False)
+    """Where that text's paths start from."""
 
     def settings(
         self, technique: TechniqueChoice

@@ -4,7 +4,7 @@ import itertools
 
 from retraverse.datasets.known import Dataset
 from retraverse.errors import InputError, RetraverseError
-from retraverse.studies.plan import PicturePair, StudyPlan
+from retraverse.studies.plan import CHUNK_FRAMES, PicturePair, StudyPlan
 
 __all__ = ["PlanError", "plan_problems"]
 
@@ -23,6 +23,7 @@ def plan_problems(plan: StudyPlan) -> list[str]:
     problems = [
         *_technique_problems(plan),
         *_dynamic_problems(plan),
+        *_picture_problems(plan),
         *(problem for dataset in plan.datasets for problem in _dataset_problems(plan, dataset)),
     ]
     return list(dict.fromkeys(problems))
@@ -48,6 +49,22 @@ def _dynamic_problems(plan: StudyPlan) -> list[str]:
         for chosen, length in plan.settings(technique)
         if length == "dynamic" and chosen.name != "mean"
     ]
+
+
+def _picture_problems(plan: StudyPlan) -> list[str]:
+    problems = []
+    for pair in plan.pairs:
+        if pair.query.video is not None and CHUNK_FRAMES % pair.query.video.length:
+            problems.append(
+                f"video.group: got {pair.query.video.length}, expected 1, 2, 4, 8, 16 or "
+                f"{CHUNK_FRAMES}: {CHUNK_FRAMES} frames are described as one task"
+            )
+        if plan.legibility and pair.query.resize is None:
+            problems.append(
+                "legibility: got pictures that are not resized; expected images.resize, as the "
+                "scenes to be read have a size of their own"
+            )
+    return problems
 
 
 def _dataset_problems(plan: StudyPlan, dataset: Dataset) -> list[str]:

@@ -6,11 +6,14 @@ The keys (all but ``datasets`` and ``techniques`` may be left out)::
     chapter = "6"
     data = "datasets"                  # data root, from the plan's folder
     datasets = ["stromovka"]           # or { name, query, reference, truth | radius_m | tolerance }
+    speeds = ["constant"]              # the query driven again: "varying", "stops", "backwards",
+                                       # "detour", "jump"; every dataset at every speed
     techniques = ["cohog", { name = "hog", parameters = { form = "chapter6" } }]
     matchers = ["mean", { name = "seqslam", sequence_lengths = [10] }]
     sequence_lengths = ["1..20", "dynamic"]
     seeds = [0]
     entropy = false
+    legibility = false                 # how large writing must be to be read
     modules = []                       # Python modules that register techniques of your own
 
     [images]
@@ -22,51 +25,51 @@ The keys (all but ``datasets`` and ``techniques`` may be left out)::
     levels = [0, 50, 80, 90, 95, 97, 99]   # "none" = pictures as they are
     pairs = ["uniform", "query", "reference"]   # or "grid"; or query = [...], reference = [...]
     other = 0                          # c of the side that "query" and "reference" leave alone
+    parts = ["whole"]                  # parts of JPEG's damage alone: "grid", ...; "every" = each
+
+    [video]                            # the query as groups of a codec; the map at `other`
+    h265 = [30, 35]                    # quality factors, larger is coarser
+    av1 = [40]
+    group = 8                          # pictures a group: 1, 2, 4, 8, 16 or 32
 """
 
 import importlib
 import itertools
 import tomllib
-from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, cast, get_args
+from typing import Any
 
+from retraverse.datasets.driven_again import driven_again
 from retraverse.datasets.known import Dataset, find_dataset, known_dataset, open_dataset
+from retraverse.datasets.resample import PROFILES
 from retraverse.errors import ConfigError, DataMissingError, InputError
-from retraverse.images import QuantisationTables
-from retraverse.images.jpeg import Encoder
-from retraverse.images.worsen import Resizer, Worsening
 from retraverse.matching import SequenceLength
-from retraverse.registry import read_parameters, unknown_name
-from retraverse.studies.plan import (
-    MatcherChoice,
-    PairRule,
-    PicturePair,
-    StudyPlan,
-    TechniqueChoice,
-    compression_pairs,
-)
+from retraverse.registry import unknown_name
+from retraverse.studies.plan import MatcherChoice, PlanOrigin, StudyPlan, TechniqueChoice
 from retraverse.studies.plan_checks import PlanError, plan_problems
+from retraverse.studies.plan_pictures import read_pairs
 from retraverse.studies.table_reader import Table, TableReader
-from retraverse.studies.tables_file import load_tables, read_tables
 
-__all__ = ["PlanError", "load_plan", "read_plan"]
+__all__ = ["PlanError", "load_plan", "plan_datasets", "read_plan"]
 
 _KEYS = (
     "name",
     "chapter",
     "data",
     "datasets",
+    "speeds",
     "techniques",
     "matchers",
     "sequence_lengths",
     "seeds",
     "entropy",
+    "legibility",
     "modules",
     "images",
     "compression",
+    "video",
 )
 _LONGEST_LENGTH = 100_000
 
@@ -133,7 +136,25 @@ def read_plan(
     problems = list(dict.fromkeys([*reader.problems, *plan_problems(plan)]))
     if problems:
         raise PlanError(source, problems)
-    return replace(plan, text=text)
+    origin = PlanOrigin(root.absolute(), None if data is None else Path(data).absolute())
+    return replace(plan, text=text, origin=origin)
+
+
+def plan_datasets(text: str, origin: PlanOrigin) -> tuple[Dataset, ...]:
+    """Return the datasets of a plan that are here, and look at nothing else of it.
+
+    Modules that the plan names are not imported: whoever looks at a study need not run its code.
+
+    Raises
+    ------
+    InputError
+        If it is no TOML.
+    """
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"plan: not TOML: {error}") from error
+    return _Reader(table, origin.root, origin.data, True).datasets()
 
 
 class _Reader(TableReader):
@@ -154,7 +175,6 @@ class _Reader(TableReader):
         modules = tuple(self.listed("modules", table, str, []))
         for module in modules:
             self.attempt(partial(_import, module))
-        found = [self._dataset(value) for value in self.listed("datasets", table, (str, dict))]
         techniques = [
             self._technique(value) for value in self.listed("techniques", table, (str, dict))
         ]
@@ -162,18 +182,25 @@ class _Reader(TableReader):
         plan = StudyPlan(
             name=self.value("name", table, str, default_name),
             chapter=self.value("chapter", table, str, ""),
-            datasets=tuple(dataset for dataset in found if dataset is not None),
+            datasets=self.datasets(),
             techniques=tuple(technique for technique in techniques if technique is not None),
-            pairs=self._pairs(),
+            pairs=read_pairs(self, table, self._root),
             matchers=self._matchers(matchers),
             sequence_lengths=self._lengths("sequence_lengths", table) or (1,),
             seeds=self._seeds(),
             entropy=self.value("entropy", table, bool, False),
+            legibility=self.value("legibility", table, bool, False),
             modules=modules,
             missing=tuple(self._missing),
         )
         self.nothing_twice("datasets", [dataset.name for dataset in plan.datasets])
         return plan
+
+    def datasets(self) -> tuple[Dataset, ...]:
+        """Return the datasets that are here, at every speed of the plan."""
+        listed = self.listed("datasets", self._table, (str, dict))
+        found = [self._dataset(value) for value in listed]
+        return self._at_every_speed([dataset for dataset in found if dataset is not None])
 
     def _dataset(self, value: str | Table) -> Dataset | None:
         if isinstance(value, dict):
@@ -208,6 +235,16 @@ class _Reader(TableReader):
                 every=self.whole("every", table, 1, least=1),
             )
         )
+
+    def _at_every_speed(self, datasets: list[Dataset]) -> tuple[Dataset, ...]:
+        """Return every dataset at every speed of the plan."""
+        speeds = self.listed("speeds", self._table, str, ["constant"])
+        for speed in speeds:
+            if speed not in PROFILES:
+                self.problems.append(unknown_name("speed in speeds", speed, list(PROFILES)))
+        known = dict.fromkeys(speed for speed in speeds if speed in PROFILES)
+        pairs = itertools.product(datasets, known)
+        return tuple(driven_again(dataset, speed) for dataset, speed in pairs)
 
     def _technique(self, value: str | Table) -> TechniqueChoice | None:
         table = {"name": value} if isinstance(value, str) else value
@@ -260,126 +297,6 @@ class _Reader(TableReader):
             if seed < 0:
                 self.problems.append(f"seeds: got {seed}, expected whole numbers from 0")
         return tuple(dict.fromkeys(seeds))
-
-    def _pairs(self) -> tuple[PicturePair, ...]:
-        images = self.value("images", self._table, dict, {})
-        self.known_keys("images", images, ("resize", "resizer", "encoders"))
-        encoders = [
-            self.attempt(partial(_encoder, value, self._root))
-            for value in self.listed("encoders", images, dict, [{}], "images")
-        ]
-        sizes = [size or None for size in self.listed("resize", images, int, [0], "images")]
-        resizer = self.value("resizer", images, str, "pillow", "images")
-        levels_of_pairs = self._compressions()
-        sound = [self.attempt(partial(_worsening, size, resizer)) for size in sizes]
-        if None in sound:
-            return ()
-        pairs = []
-        for size, encoder, levels in itertools.product(sizes, encoders, levels_of_pairs):
-            made = [
-                self.attempt(partial(_worsening, size, resizer, level, encoder or Encoder()))
-                for level in levels
-            ]
-            sides = [worsening for worsening in made if worsening is not None]
-            pairs += [PicturePair(*sides)] if len(sides) == 2 else []
-        return tuple(dict.fromkeys(map(_settled, pairs)))
-
-    def _compressions(self) -> tuple[tuple[int | None, int | None], ...]:
-        table = self.value("compression", self._table, dict, {})
-        self.known_keys("compression", table, ("levels", "pairs", "other", "query", "reference"))
-        sides = [key for key in ("query", "reference") if key in table]
-        if "levels" in table and sides:
-            self.problems.append(
-                f"compression: got levels and {sides[0]}, expected levels with pairs, or query "
-                "and reference"
-            )
-        if sides:
-            query, reference = (
-                self._levels(key, table, ["none"]) for key in ("query", "reference")
-            )
-            return tuple(itertools.product(query, reference))
-        levels = self._levels("levels", table, ["none"])
-        other = (
-            self._levels("other", {"other": [table["other"]]}, []) if "other" in table else [None]
-        )
-        return compression_pairs(tuple(levels), self._rules(table), *other[:1])
-
-    def _levels(self, key: str, table: Table, default: list[Any]) -> list[int | None]:
-        values = self.listed(key, table, (int, str), default, "compression")
-        for value in values:
-            if not (value == "none" or (isinstance(value, int) and 0 <= value <= 99)):
-                self.problems.append(
-                    f"compression.{key}: got {value!r}, expected whole numbers from 0 to 99, or "
-                    "'none' for pictures as they are"
-                )
-        return [value if isinstance(value, int) else None for value in values]
-
-    def _rules(self, table: Table) -> tuple[PairRule, ...]:
-        rules = self.listed("pairs", table, str, ["uniform"], "compression")
-        known = sorted(get_args(PairRule))
-        for rule in rules:
-            if rule not in known:
-                self.problems.append(unknown_name("compression.pairs", rule, known))
-        return tuple(rule for rule in rules if rule in known)
-
-
-def _settled(pair: PicturePair) -> PicturePair:
-    """Return the pair without options that make no difference, so that no run is there twice."""
-
-    def settle(worsening: Worsening) -> Worsening:
-        plain = Worsening()
-        settled = worsening
-        if worsening.resize is None:
-            settled = replace(settled, resizer=plain.resizer)
-        if worsening.compression is None:
-            settled = replace(settled, encoder=plain.encoder)
-        return settled
-
-    return PicturePair(settle(pair.query), settle(pair.reference))
-
-
-def _encoder(table: Mapping[str, Any], root: Path) -> Encoder:
-    """Return the encoder of a table of options."""
-    known = [field.name for field in fields(Encoder)]
-    for key in table:
-        if key not in known:
-            raise ConfigError(unknown_name("key in images.encoders", key, known))
-    tables = _tables(table["tables"], root) if "tables" in table else None
-    flags = {key: value for key, value in table.items() if isinstance(value, bool)}
-    words = {key: value for key, value in table.items() if key not in (*flags, "tables")}
-    for key in flags:
-        if key not in ("optimize", "progressive"):
-            raise ConfigError(f"images.encoders: {key}: got {flags[key]}, expected a text")
-    for key in words:
-        if key in ("optimize", "progressive"):
-            raise ConfigError(f"images.encoders: {key}: got {words[key]!r}, expected true or false")
-    chosen: Encoder = read_parameters("images.encoders", Encoder, words)
-    return replace(
-        chosen,
-        optimize=flags.get("optimize", chosen.optimize),
-        progressive=flags.get("progressive", chosen.progressive),
-        tables=tables,
-    )
-
-
-def _tables(value: object, root: Path) -> QuantisationTables:
-    """Return the tables of a file's path, or those that are in the plan itself."""
-    where = "images.encoders: tables"
-    if isinstance(value, str):
-        return load_tables(root / value)
-    if isinstance(value, dict):
-        return read_tables(value, where)
-    raise ConfigError(
-        f"{where}: got {value!r}, expected the path of a JSON file, or a table with luminance "
-        "and chrominance"
-    )
-
-
-def _worsening(
-    size: int | None, resizer: str, level: int | None = None, encoder: Encoder | None = None
-) -> Worsening:
-    """Return what is done to a picture; the resizer is a text until it is checked there."""
-    return Worsening(size, cast(Resizer, resizer), level, encoder or Encoder())
 
 
 def _import(module: str) -> None:

@@ -31,8 +31,8 @@ from retraverse.images import (
     worsened,
 )
 from retraverse.images.jpeg import check_compression
+from retraverse.images.picture_cache import native_pixels
 from retraverse.images.quantisation import STANDARD_TABLES
-from retraverse.images.worsen import native_pixels
 from retraverse.maps.describe import describe_traverse
 from retraverse.techniques import Descriptions, Technique
 from retraverse.types import Array, FloatArray, ImageArray, IntArray, Progress, no_progress

@@ -71,6 +71,14 @@ class RunRecord:
     """c of the reference pictures, 0 to 99; -1 = as they are."""
     encoder: str = ""
     """The JPEG encoder's options, "" where nothing was compressed."""
+    jpeg_part: str = ""
+    """Which part of JPEG's damage was done, a name of `JPEG_PARTS`; "" = JPEG as it is."""
+    video: str = ""
+    """The video codec the query was sent by, ``"h265"`` or ``"av1"``; "" = none."""
+    video_quality: int = -1
+    """Its constant rate factor, larger is coarser; -1 = none."""
+    group_length: int = 0
+    """Pictures sent as one group of pictures, 0 = none."""
     resize: int = 0
     """Side in pixels the pictures were brought to, 0 = none."""
     resizer: str = ""
@@ -113,8 +121,13 @@ class RunRecord:
     """Bytes of all query pictures."""
     reference_bytes_total: int = -1
     """Bytes of all reference pictures."""
+    query_bare_bytes_mean: float = math.nan
+    """Mean bytes of a query picture without its constant JPEG tables."""
     entropy_query_mean: float = math.nan
     """Mean entropy of the query pictures, in [0, 1]."""
+    legible_height: float = math.nan
+    """Smallest height of characters that can be read in query pictures, as a share of their side;
+    NaN where it was not measured, or none up to a quarter of the side can be read."""
     descriptor_bytes: int = -1
     """Bytes of one picture's descriptor."""
     descriptor_dimension: int = -1

@@ -71,8 +71,8 @@ def datasets_here(data: str | Path, names: Sequence[str]) -> tuple[str, ...]:
 def _plan_texts() -> list[tuple[str, str]]:
     folder = files("retraverse.studies") / "chapters"
     found = sorted(item.name for item in folder.iterdir() if item.name.endswith(".toml"))
-    # The chapters' own order: "beyond" comes last.
-    ordered = sorted(found, key=lambda name: name == "beyond.toml")
+    # The chapters' own order: what is beyond them comes last.
+    ordered = sorted(found, key=lambda name: name.startswith("beyond"))
     return [(name, (folder / name).read_text(encoding="utf-8")) for name in ordered]
 
 

@@ -17,19 +17,23 @@ from retraverse.datasets import GroundTruth
 from retraverse.datasets.known import Dataset
 from retraverse.errors import DataMissingError, RetraverseError
 from retraverse.images import Frame, Traverse
-from retraverse.images.worsen import Worsening
+from retraverse.images.worsening import Worsening
 from retraverse.studies.cache import content_key
 from retraverse.studies.describe_task import made_technique, one_line_reason
 from retraverse.studies.match_task import RunSpec, needs_descriptions
-from retraverse.studies.plan import MatcherChoice, PicturePair, StudyPlan, TechniqueChoice
+from retraverse.studies.plan import (
+    CHUNK_FRAMES,
+    MatcherChoice,
+    PicturePair,
+    StudyPlan,
+    TechniqueChoice,
+)
 from retraverse.studies.records import RunRecord, Status
 from retraverse.types import Progress, no_progress
 
-__all__ = ["CHUNK_FRAMES", "CODE", "Chunk", "Drive", "Job", "jobs", "read_drive"]
+__all__ = ["CODE", "Chunk", "Drive", "Job", "jobs", "read_drive"]
 
-CHUNK_FRAMES = 32
-"""Frames that are described as one task, and kept as one cache entry."""
-CODE = ("study 1", __version__)
+CODE = ("study 2", __version__)
 """Part of every key: results of other code are not ours. Raise the number if the meaning of an
 entry or record changes between two versions of this package."""
 
@@ -101,6 +105,8 @@ class Job:
     chapter: str
     with_entropy: bool
     """Whether the entropy of the query pictures goes into the records."""
+    with_legibility: bool = False
+    """Whether what can be read in query pictures goes into the records."""
     error: tuple[Status, str] | None = None
     """Why it cannot be run at all."""
     _fingerprints: dict[tuple[Worsening, bytes], str] = field(default_factory=dict, repr=False)
@@ -140,6 +146,11 @@ class Job:
         """Key of sizes, t_c and entropy of some frames."""
         return content_key(CODE, "pictures", self._pictures(worsening, chunk.content), entropy)
 
+    @cached_property
+    def legibility_key(self) -> str:
+        """Key of what can be read in pictures like the query's."""
+        return content_key(CODE, "legibility", self._pictures(self.pair.query, b""))
+
     def _pictures(self, worsening: Worsening, content: bytes) -> str:
         """Return what identifies pictures: what they were and what was done to them."""
         known = self._fingerprints.get((worsening, content))
@@ -153,6 +164,7 @@ class Job:
         layout = None if self.error else made_technique(self.technique).layout
         pair, truth = self.pair, None if self.error else self.dataset.truth()
         encoded = [side for side in (pair.query, pair.reference) if side.compression is not None]
+        video = pair.query.video
         return RunRecord(
             run_id="",
             study=self.study,
@@ -163,6 +175,10 @@ class Job:
             compression_query=_or(pair.query.compression, -1),
             compression_reference=_or(pair.reference.compression, -1),
             encoder=encoded[0].encoder.label if encoded else "",
+            jpeg_part=pair.query.part,
+            video="" if video is None else video.codec,
+            video_quality=-1 if video is None else video.quality,
+            group_length=0 if video is None else video.length,
             resize=_or(pair.query.resize, 0),
             resizer=pair.query.resizer if pair.query.resize else "",
             tolerance_frames=-1 if truth is None else self.dataset.tolerance_frames,
@@ -199,6 +215,7 @@ def jobs(plan: StudyPlan, dataset: Dataset, query: Drive, reference: Drive) -> I
                 study=plan.name,
                 chapter=plan.chapter,
                 with_entropy=plan.entropy,
+                with_legibility=plan.legibility,
                 error=error,
                 _fingerprints=fingerprints,
             )
@@ -206,7 +223,7 @@ def jobs(plan: StudyPlan, dataset: Dataset, query: Drive, reference: Drive) -> I
 
 
 def _runs(plan: StudyPlan, job: Job, truth: str) -> Iterator[RunSpec]:
-    common = [CODE, job.dataset.name, job.matrix_key, truth, job.with_entropy]
+    common = [CODE, job.dataset.name, job.matrix_key, truth, job.with_entropy, job.with_legibility]
     common_key = content_key(common)
     for chosen, length in plan.settings(job.technique):
         label = _label(chosen.name, tuple(sorted(chosen.parameters.items())))

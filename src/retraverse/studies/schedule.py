@@ -23,6 +23,8 @@ COST_S = 0.01
 """Seconds of one unit of cost."""
 NETWORK_COST = 20
 """A network takes so many times as long for a picture as a handcrafted technique."""
+LEGIBILITY_COST = 500
+"""Finding out what can be read, without any frames."""
 OPERATIONS_S = 4e10
 """Multiplications of a similarity matrix a second, on one thread."""
 RUN_S = 0.003
@@ -33,6 +35,8 @@ CELL_S = 1e-7
 
 def describe_cost(task: DescribeTask) -> int:
     """Return about how long describing some frames takes, in units of `COST_S`."""
+    if not task.frames:
+        return LEGIBILITY_COST * len(task.wanted)
     return len(task.frames) * sum(map(_picture_cost, task.wanted))
 
 

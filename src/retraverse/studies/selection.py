@@ -49,6 +49,10 @@ class Condition:
     compression_query: int
     compression_reference: int
     encoder: str
+    jpeg_part: str
+    video: str
+    video_quality: int
+    group_length: int
     resize: int
     resizer: str
     seed: int
@@ -83,6 +87,10 @@ def condition_of(record: RunRecord) -> Condition:
         compression_query=record.compression_query,
         compression_reference=record.compression_reference,
         encoder=record.encoder,
+        jpeg_part=record.jpeg_part,
+        video=record.video,
+        video_quality=record.video_quality,
+        group_length=record.group_length,
         resize=record.resize,
         resizer=record.resizer,
         seed=record.seed,

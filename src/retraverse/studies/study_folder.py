@@ -3,6 +3,7 @@
 ::
 
     plan.toml      the plan, as it was given last
+    origin.json    the folder that its paths start from, and the data root, if one was given
     records/       one Parquet file for every few runs; a run is done when its record is here
     superseded/    records of runs that a later plan, or a changed dataset, no longer asks for
     cache/         descriptors and matrices; may lie elsewhere, and may be deleted
@@ -11,6 +12,7 @@ Nothing in ``records/`` is ever half-written.
 """
 
 import hashlib
+import json
 import logging
 import os
 from collections.abc import Collection, Iterator, Sequence
@@ -18,8 +20,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from retraverse.datasets.known import Dataset
 from retraverse.errors import InputError
 from retraverse.files import write_whole
+from retraverse.studies.plan import PlanOrigin, StudyPlan
+from retraverse.studies.plan_file import plan_datasets
 from retraverse.studies.records import (
     RunRecord,
     read_index,
@@ -28,10 +33,11 @@ from retraverse.studies.records import (
     write_records,
 )
 
-__all__ = ["StudyFolder", "read_study"]
+__all__ = ["StudyFolder", "read_study", "study_datasets"]
 
 logger = logging.getLogger(__name__)
 
+_PLAN, _ORIGIN = "plan.toml", "origin.json"
 _Index = tuple[str, str, str, str]
 
 
@@ -79,10 +85,15 @@ class StudyFolder:
         finally:
             os.close(lock)
 
-    def write_plan(self, text: str) -> None:
-        """Keep the plan's text beside its records."""
-        if text:
-            write_whole(self.path / "plan.toml", text.encode())
+    def write_plan(self, plan: StudyPlan) -> None:
+        """Keep the plan's text beside the records, and where its paths start from."""
+        if not plan.text or plan.origin is None:
+            return
+        write_whole(self.path / _PLAN, plan.text.encode())
+        places = {"root": str(plan.origin.root)}
+        if plan.origin.data is not None:
+            places["data"] = str(plan.origin.data)
+        write_whole(self.path / _ORIGIN, json.dumps(places).encode())
 
     def settle(self, wanted: Collection[str], study: str, chapter: str) -> set[str]:
         """Return the wanted runs that are done; move what is not wanted out of the way.
@@ -137,6 +148,18 @@ class StudyFolder:
     def _put_away(self, file: Path) -> None:
         (self.path / "superseded").mkdir(exist_ok=True)
         file.replace(self.path / "superseded" / f"{file.name}.damaged")
+
+
+def study_datasets(path: Path) -> dict[str, Dataset]:
+    """Return the datasets of a study's plan by name, those that are still where they were."""
+    try:
+        places = json.loads((path / _ORIGIN).read_bytes())
+        data = places.get("data")
+        origin = PlanOrigin(Path(places["root"]), None if data is None else Path(data))
+        found = plan_datasets((path / _PLAN).read_text(encoding="utf-8"), origin)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return {}  # Made in Python, or by hand: there is nothing to find.
+    return {dataset.name: dataset for dataset in found}
 
 
 def read_study(path: str | os.PathLike[str]) -> tuple[RunRecord, ...]:

@@ -136,6 +136,9 @@ class _Planner:
 
 def wanted_entries(job: Job, with_descriptions: bool) -> Iterator[tuple[Wanted, Chunk]]:
     """Yield every entry a job needs, with the frames it is made of."""
+    if job.with_legibility:
+        seen = job.pair.query
+        yield Wanted(job.legibility_key, seen, None, legibility=True), Chunk(seen.label, (), ())
     for side, (drive, worsening) in enumerate(job.sides):
         entropy = job.needs_entropy and side == 0
         for chunk in drive.chunks:

@@ -2,6 +2,10 @@
 
 A new technique is one file in this room: a class with the members of `Technique`, a frozen
 dataclass of parameters, and `register` above it. Nothing else needs to know.
+
+What several of them share has rooms of its own: `preparing` (pictures for networks), `running`
+(weights, batches, runtimes), `networks` (what is run), `handmade` (gradients, filters, entropy)
+and `summarising` (pooling, projection, unit vectors).
 """
 
 import sys

@@ -7,15 +7,6 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 
 from retraverse.techniques.base import ArraySpec, Layout
-from retraverse.techniques.caffe_preparation import (
-    IMAGENET_MEAN_BGR,
-    ChannelOrder,
-    cubic,
-    equalised,
-    in_order,
-    smooth,
-)
-from retraverse.techniques.learned import LearnedParameters, LearnedTechnique
 from retraverse.techniques.networks.caffe_tables import (
     ALEXNET,
     CAFFENET,
@@ -24,10 +15,19 @@ from retraverse.techniques.networks.caffe_tables import (
     until,
 )
 from retraverse.techniques.parameters import check_range, parameter
-from retraverse.techniques.pooling import flat
-from retraverse.techniques.preparation import channels_first
-from retraverse.techniques.random_projection import gaussian_projection
+from retraverse.techniques.preparing.caffe_input import (
+    IMAGENET_MEAN_BGR,
+    ChannelOrder,
+    cubic,
+    equalised,
+    in_order,
+    smooth,
+)
+from retraverse.techniques.preparing.network_input import channels_first
 from retraverse.techniques.registry import register
+from retraverse.techniques.running.learned import LearnedParameters, LearnedTechnique
+from retraverse.techniques.summarising.pooling import flat
+from retraverse.techniques.summarising.random_projection import gaussian_projection
 from retraverse.types import Array, FloatArray, ImageArray
 
 if TYPE_CHECKING:

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 from retraverse.techniques.base import ArraySpec, Layout
-from retraverse.techniques.learned import LearnedParameters, LearnedTechnique
 from retraverse.techniques.parameters import check_multiple, parameter
-from retraverse.techniques.published_input import imagenet_normalised, resized_float
+from retraverse.techniques.preparing.published_input import imagenet_normalised, resized_float
 from retraverse.techniques.registry import register
+from retraverse.techniques.running.learned import LearnedParameters, LearnedTechnique
 from retraverse.types import Array, FloatArray, ImageArray
 from retraverse.weights.store import find_weights
 

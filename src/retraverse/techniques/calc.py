@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from retraverse.techniques.base import ArraySpec, Layout
-from retraverse.techniques.caffe_preparation import cubic, equalised
-from retraverse.techniques.learned import LearnedParameters, LearnedTechnique
 from retraverse.techniques.networks.caffe_tables import CALC, graph_of, output_shape
 from retraverse.techniques.parameters import parameter
+from retraverse.techniques.preparing.caffe_input import cubic, equalised
 from retraverse.techniques.registry import register
+from retraverse.techniques.running.learned import LearnedParameters, LearnedTechnique
 from retraverse.types import Array, FloatArray, ImageArray
 
 if TYPE_CHECKING:

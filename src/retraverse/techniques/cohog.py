@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from retraverse.techniques.regional_hog import RegionalHog, RegionalHogParameters
+from retraverse.techniques.handmade.regional_hog import RegionalHog, RegionalHogParameters
 from retraverse.techniques.registry import register
 
 __all__ = ["CoHog"]

@@ -5,8 +5,8 @@ from typing import ClassVar, Literal
 
 from retraverse.errors import ConfigError
 from retraverse.images import GreyPath
+from retraverse.techniques.handmade.regional_hog import RegionalHog, RegionalHogParameters
 from retraverse.techniques.parameters import check_range, parameter
-from retraverse.techniques.regional_hog import RegionalHog, RegionalHogParameters
 from retraverse.techniques.registry import register
 
 __all__ = ["ConvSequential", "ConvSequentialParameters"]

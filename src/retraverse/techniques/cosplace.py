@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 from retraverse.errors import ConfigError
 from retraverse.techniques.base import ArraySpec, Layout
-from retraverse.techniques.learned import LearnedParameters, LearnedTechnique
 from retraverse.techniques.parameters import check_range, parameter
-from retraverse.techniques.published_input import imagenet_normalised, resized_8_bit
+from retraverse.techniques.preparing.published_input import imagenet_normalised, resized_8_bit
 from retraverse.techniques.registry import register
+from retraverse.techniques.running.learned import LearnedParameters, LearnedTechnique
 from retraverse.types import Array, FloatArray, ImageArray
 from retraverse.weights.published import COSPLACE_DIMENSIONS
 from retraverse.weights.store import find_weights

@@ -15,10 +15,10 @@ import numpy as np
 from retraverse.errors import ConfigError, DataMissingError, InputError, ShapeError
 from retraverse.images import Frame
 from retraverse.techniques.base import BatchTechnique, Description, Descriptions, Technique
-from retraverse.techniques.extras import import_extra
-from retraverse.techniques.file_digest import file_digest
 from retraverse.techniques.parameters import check_range, parameter
 from retraverse.techniques.registry import register, technique
+from retraverse.techniques.running.extras import import_extra
+from retraverse.techniques.running.file_digest import file_digest
 from retraverse.types import Array, FloatArray, ImageArray
 from retraverse.weights.store import find_weights, load_tensors
 
@@ -164,7 +164,7 @@ class DeepSeqSlam:
         import torch
 
         from retraverse.techniques.networks.deepseqslam import window_positions, windows
-        from retraverse.techniques.torch_runtime import torch_threads
+        from retraverse.techniques.running.torch_runtime import torch_threads
 
         network = self.network()
         _check_shapes(descriptors, positions, network.lstm.input_size - 2)

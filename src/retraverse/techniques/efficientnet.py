@@ -30,11 +30,11 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 
 from retraverse.techniques.base import ArraySpec, Layout
-from retraverse.techniques.learned import LearnedParameters, LearnedTechnique
 from retraverse.techniques.parameters import check_range, parameter
-from retraverse.techniques.pooling import pool, pooled_length
-from retraverse.techniques.preparation import channels_first, resized
+from retraverse.techniques.preparing.network_input import channels_first, resized
 from retraverse.techniques.registry import register
+from retraverse.techniques.running.learned import LearnedParameters, LearnedTechnique
+from retraverse.techniques.summarising.pooling import pool, pooled_length
 from retraverse.types import Array, FloatArray, ImageArray
 
 if TYPE_CHECKING:

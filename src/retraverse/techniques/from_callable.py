@@ -20,7 +20,7 @@ from retraverse.images import Frame
 from retraverse.techniques.base import ArraySpec, Description, Descriptions, Layout, Technique
 from retraverse.techniques.parameters import parameter
 from retraverse.techniques.registry import CALLABLE_PREFIX
-from retraverse.techniques.vectors import cosine_similarity, unit_vector
+from retraverse.techniques.summarising.vectors import cosine_similarity, unit_vector
 from retraverse.types import FloatArray, ImageArray
 
 __all__ = ["CallableParameters", "technique_from_callable"]

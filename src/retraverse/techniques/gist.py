@@ -7,7 +7,7 @@ import numpy as np
 
 from retraverse.images import Frame, GreyPath
 from retraverse.techniques.base import ArraySpec, Description, Descriptions, Layout
-from retraverse.techniques.gist_filters import (
+from retraverse.techniques.handmade.gist_filters import (
     BORDER,
     GRID,
     ORIENTATIONS,
@@ -18,7 +18,7 @@ from retraverse.techniques.gist_filters import (
 )
 from retraverse.techniques.parameters import check_multiple, parameter
 from retraverse.techniques.registry import register
-from retraverse.techniques.vectors import cosine_similarity, unit_vector
+from retraverse.techniques.summarising.vectors import cosine_similarity, unit_vector
 from retraverse.types import Array, FloatArray, ImageArray
 
 __all__ = ["Gist", "GistParameters"]

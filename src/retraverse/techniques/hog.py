@@ -10,7 +10,7 @@ from retraverse.images import Frame
 from retraverse.techniques.base import ArraySpec, Description, Descriptions, Layout
 from retraverse.techniques.parameters import check_range, parameter
 from retraverse.techniques.registry import register
-from retraverse.techniques.vectors import cosine_similarity, unit_vector
+from retraverse.techniques.summarising.vectors import cosine_similarity, unit_vector
 from retraverse.types import FloatArray, ImageArray
 
 __all__ = ["Hog", "HogParameters"]

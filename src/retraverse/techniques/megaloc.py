@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from retraverse.techniques.base import ArraySpec, Layout
-from retraverse.techniques.learned import LearnedParameters, LearnedTechnique
 from retraverse.techniques.parameters import check_multiple, parameter
-from retraverse.techniques.published_input import imagenet_normalised, resized_float
+from retraverse.techniques.preparing.published_input import imagenet_normalised, resized_float
 from retraverse.techniques.registry import register
+from retraverse.techniques.running.learned import LearnedParameters, LearnedTechnique
 from retraverse.techniques.salad import DESCRIPTOR_LENGTH, LARGEST_SIDE, LEAST_SIDE, PATCH
 from retraverse.types import Array, FloatArray, ImageArray
 

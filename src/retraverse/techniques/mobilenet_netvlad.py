@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from retraverse.techniques.base import ArraySpec, Layout
-from retraverse.techniques.learned import LearnedParameters, LearnedTechnique
 from retraverse.techniques.parameters import check_range, parameter
-from retraverse.techniques.preparation import channels_first
+from retraverse.techniques.preparing.network_input import channels_first
 from retraverse.techniques.registry import register
+from retraverse.techniques.running.learned import LearnedParameters, LearnedTechnique
 from retraverse.types import Array, FloatArray, ImageArray
 
 if TYPE_CHECKING:

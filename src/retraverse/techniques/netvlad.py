@@ -8,11 +8,11 @@ import numpy as np
 
 from retraverse.errors import ConfigError
 from retraverse.techniques.base import ArraySpec, Layout
-from retraverse.techniques.caffe_preparation import cubic
-from retraverse.techniques.learned import LearnedParameters, LearnedTechnique
 from retraverse.techniques.parameters import check_range, parameter
-from retraverse.techniques.preparation import channels_first
+from retraverse.techniques.preparing.caffe_input import cubic
+from retraverse.techniques.preparing.network_input import channels_first
 from retraverse.techniques.registry import register
+from retraverse.techniques.running.learned import LearnedParameters, LearnedTechnique
 from retraverse.types import Array, FloatArray, ImageArray
 
 if TYPE_CHECKING:

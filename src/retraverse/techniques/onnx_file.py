@@ -9,14 +9,14 @@ import numpy as np
 
 from retraverse.errors import ConfigError, DataMissingError, InputError
 from retraverse.techniques.base import ArraySpec, Layout
-from retraverse.techniques.batching import Runner
-from retraverse.techniques.extras import import_extra
-from retraverse.techniques.learned import LearnedParameters, LearnedTechnique
 from retraverse.techniques.parameters import check_range, parameter
-from retraverse.techniques.pooling import flat, pool
-from retraverse.techniques.preparation import channels_first, resized
-from retraverse.techniques.published_input import resized_8_bit
+from retraverse.techniques.preparing.network_input import channels_first, resized
+from retraverse.techniques.preparing.published_input import resized_8_bit
 from retraverse.techniques.registry import register
+from retraverse.techniques.running.batching import Runner
+from retraverse.techniques.running.extras import import_extra
+from retraverse.techniques.running.learned import LearnedParameters, LearnedTechnique
+from retraverse.techniques.summarising.pooling import flat, pool
 from retraverse.types import Array, FloatArray, ImageArray
 
 if TYPE_CHECKING:

@@ -12,7 +12,9 @@ from retraverse.errors import DataMissingError, InputError
 from retraverse.files import check_writable_place, write_whole
 from retraverse.images import Frame
 from retraverse.techniques.base import ArraySpec, Description, Layout
-from retraverse.techniques.caffe_preparation import (
+from retraverse.techniques.networks.caffe_tables import CAFFENET, graph_of, output_shape, until
+from retraverse.techniques.parameters import check_range, parameter
+from retraverse.techniques.preparing.caffe_input import (
     MEAN_COLOUR,
     ChannelOrder,
     find_mean,
@@ -20,13 +22,15 @@ from retraverse.techniques.caffe_preparation import (
     read_mean,
     smooth,
 )
-from retraverse.techniques.file_digest import file_digest
-from retraverse.techniques.learned import LearnedParameters, LearnedTechnique
-from retraverse.techniques.networks.caffe_tables import CAFFENET, graph_of, output_shape, until
-from retraverse.techniques.parameters import check_range, parameter
-from retraverse.techniques.preparation import channels_first
-from retraverse.techniques.regions import build_clusters, region_features, vlad_of_regions
+from retraverse.techniques.preparing.network_input import channels_first
 from retraverse.techniques.registry import register
+from retraverse.techniques.running.file_digest import file_digest
+from retraverse.techniques.running.learned import LearnedParameters, LearnedTechnique
+from retraverse.techniques.summarising.regions import (
+    build_clusters,
+    region_features,
+    vlad_of_regions,
+)
 from retraverse.types import Array, FloatArray, ImageArray, Progress, no_progress
 from retraverse.weights.store import find_weights, load_tensors
 

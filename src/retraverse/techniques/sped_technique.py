@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from retraverse.techniques.base import ArraySpec, Description, Descriptions, Layout
-from retraverse.techniques.caffe_preparation import find_mean, in_order, read_mean, smooth
-from retraverse.techniques.file_digest import file_digest
-from retraverse.techniques.learned import LearnedParameters, LearnedTechnique
 from retraverse.techniques.networks.caffe_tables import SPED_NET, graph_of, until
 from retraverse.techniques.parameters import parameter
-from retraverse.techniques.preparation import channels_first
+from retraverse.techniques.preparing.caffe_input import find_mean, in_order, read_mean, smooth
+from retraverse.techniques.preparing.network_input import channels_first
+from retraverse.techniques.running.file_digest import file_digest
+from retraverse.techniques.running.learned import LearnedParameters, LearnedTechnique
 from retraverse.types import Array, FloatArray, ImageArray
 
 if TYPE_CHECKING:

@@ -28,9 +28,9 @@ from torch import Tensor, nn
 
 from retraverse.errors import ConfigError
 from retraverse.images import Traverse
-from retraverse.techniques.caffe_preparation import cubic, equalised
 from retraverse.techniques.networks.caffe_net import CaffeNet, seeded_tensors
 from retraverse.techniques.networks.caffe_tables import CALC, graph_of, output_shape
+from retraverse.techniques.preparing.caffe_input import cubic, equalised
 from retraverse.training.loop import LoopSettings, run_loop
 from retraverse.training.outcome import Outcome, write_outcome
 from retraverse.training.pictures import load_pictures

@@ -34,8 +34,8 @@ from torch.nn import functional
 
 from retraverse.errors import ConfigError
 from retraverse.images import Traverse
-from retraverse.techniques.file_digest import file_digest
-from retraverse.techniques.learned import LearnedTechnique
+from retraverse.techniques.running.file_digest import file_digest
+from retraverse.techniques.running.learned import LearnedTechnique
 from retraverse.training.folding import folded, unfolded_state
 from retraverse.training.loop import LoopSettings, run_loop
 from retraverse.training.outcome import Outcome, write_outcome

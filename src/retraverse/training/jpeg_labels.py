@@ -21,7 +21,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from retraverse.errors import ConfigError
-from retraverse.techniques.learned import LearnedTechnique
+from retraverse.techniques.running.learned import LearnedTechnique
 from retraverse.training.folding import unfolded_state
 from retraverse.training.loop import LoopSettings, run_loop
 from retraverse.training.outcome import Outcome, write_outcome

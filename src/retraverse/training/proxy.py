@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from torch import nn
 
-from retraverse.techniques.learned import LearnedTechnique
+from retraverse.techniques.running.learned import LearnedTechnique
 from retraverse.training.pictures import View, seen_through_jpeg, take_view
 from retraverse.training.tuned_network import as_input
 from retraverse.types import FloatArray, ImageArray, Progress, no_progress
@@ -125,7 +125,7 @@ def _shares_found(
 def _vectors(
     technique: LearnedTechnique, network: nn.Module, pictures: Sequence[ImageArray]
 ) -> FloatArray:
-    from retraverse.techniques.pooling import unit_rows
+    from retraverse.techniques.summarising.pooling import unit_rows
 
     rows = []
     for start in range(0, len(pictures), _AT_ONCE):

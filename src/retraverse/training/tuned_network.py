@@ -10,7 +10,7 @@ from torch import Tensor, nn
 from retraverse.errors import ConfigError
 from retraverse.registry import unknown_name
 from retraverse.techniques import technique
-from retraverse.techniques.learned import LearnedTechnique
+from retraverse.techniques.running.learned import LearnedTechnique
 from retraverse.training.folding import folded
 from retraverse.types import ImageArray
 

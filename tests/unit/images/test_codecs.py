@@ -167,3 +167,10 @@ def test_no_thread_is_left_at_real_time_priority() -> None:
     encode_group([np.zeros((64, 64), np.uint8)] * 3, "av1", 40)
     policies = {os.sched_getscheduler(int(task.name)) for task in Path("/proc/self/task").iterdir()}
     assert policies <= {os.SCHED_OTHER, os.SCHED_BATCH, os.SCHED_IDLE}
+
+
+@pytest.mark.parametrize("codec", CODECS)
+@pytest.mark.parametrize("shape", [(64, 64), (50, 98), (98, 50), (72, 90)])
+def test_the_same_pictures_give_the_same_bytes(codec: CodecName, shape: tuple[int, int]) -> None:
+    pictures = moving_street(12, *shape)
+    assert len({encode_group(pictures, codec, 35) for _ in range(12)}) == 1

@@ -23,7 +23,7 @@ from retraverse.images import (
     worsen_frame,
     worsened,
 )
-from retraverse.images.worsen import Resizer
+from retraverse.images.worsening import Resizer
 from retraverse.types import ImageArray
 
 Bytes = Callable[..., bytes]

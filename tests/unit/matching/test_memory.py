@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import retraverse as rt
 from retraverse.techniques import ArraySpec, Descriptions, Layout
-from retraverse.techniques.vectors import cosine_similarity
+from retraverse.techniques.summarising.vectors import cosine_similarity
 
 class Wide:
     name, summary, citation, version, parameters = "wide", "", "", 1, None

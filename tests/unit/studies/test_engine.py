@@ -1,6 +1,7 @@
 """The engine: every run once, nothing twice, the same records whoever computes them."""
 
 import json
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +13,10 @@ from tests.unit.studies.tiny import hashes, tiny_plan, tiny_registered, write_da
 
 import retraverse as rt
 from retraverse.errors import InputError
-from retraverse.images.worsen import Worsening, frame_bytes, worsened
+from retraverse.images.bare_jpeg import TableSet, strip_tables
+from retraverse.images.codecs import encode_group
+from retraverse.images.worsen import frame_bytes, worsened
+from retraverse.images.worsening import Worsening
 from retraverse.metrics import evaluate
 from retraverse.studies.cache import StudyCache, load_matrix
 from retraverse.studies.engine import run_study
@@ -87,6 +91,91 @@ def test_dynamic_lengths_and_first_regions_as_by_hand(data: Path, tmp_path: Path
         assert by_length[text].answer_reference == tuple(matches.reference)
         assert by_length[text].mean_sequence_length == matches.sequence_length.mean()
     assert by_length["dynamic"].sequence_lengths == tuple(matches.sequence_length)
+
+
+def made_up_height(worsening: Worsening) -> float:
+    """Return something that depends on what is done; the real one takes seconds."""
+    return math.inf if worsening.video is not None else len(worsening.label) / 1000
+
+
+def test_parts_video_and_legibility_as_by_hand(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("av", reason="the extra 'video' is not installed")
+    monkeypatch.setattr("retraverse.studies.describe_task.smallest_legible_height", made_up_height)
+    plan = tiny_plan(
+        data,
+        sequence_lengths="[3]",
+        images='{ resize = [64], resizer = "opencv" }',
+        compression='{ levels = ["none", 97], parts = ["whole", "grid"] }',
+        video="{ h265 = [40], group = 16 }",
+        legibility="true",
+    )
+    run_study(plan, tmp_path / "study", workers=0)
+    (dataset,) = plan.datasets
+    records = {
+        (one.compression_query, one.jpeg_part, one.video): one
+        for one in read_study(tmp_path / "study")
+    }
+    assert len(records) == len(plan.pairs) == 4
+    for pair in plan.pairs:
+        way = pair.query
+        record = records[
+            -1 if way.compression is None else way.compression,
+            way.part,
+            "" if way.video is None else way.video.codec,
+        ]
+        query, reference = (
+            worsened(drive, worsening)
+            for drive, worsening in (
+                (dataset.query(), way),
+                (dataset.reference(), pair.reference),
+            )
+        )
+        route = rt.build_map(reference, rt.technique("tiny"))
+        matches = rt.match(query, route, sequence_length=3)
+        assert record.answer_reference == tuple(matches.reference)
+        # What cannot be read at all is no number in a record.
+        height = math.nan if way.video is not None else made_up_height(way)
+        assert record.legible_height == pytest.approx(height, nan_ok=True)
+    files = worsened(dataset.query(), Worsening(64, "opencv", 97))
+    known = TableSet.for_encoder(compressions=[97])
+    bare = [len(strip_tables(frame.encoded() or b"", known)) for frame in files]
+    assert records[97, "", ""].query_bare_bytes_mean == pytest.approx(np.mean(bare))
+    assert np.isnan(records[97, "grid", ""].query_bare_bytes_mean)
+    pictures = [frame.grey() for frame in worsened(dataset.query(), Worsening(64, "opencv"))]
+    groups = [encode_group(pictures[at : at + 16], "h265", 40) for at in range(0, 40, 16)]
+    sent = records[-1, "", "h265"]
+    assert sent.query_bytes_total == sum(map(len, groups))
+    assert (sent.video_quality, sent.group_length) == (40, 16)
+
+
+def test_each_speed_is_a_dataset_of_its_own(data: Path, tmp_path: Path) -> None:
+    speeds = ("constant", "stops", "detour", "jump")
+    plan = tiny_plan(
+        data,
+        speeds=str(list(speeds)),
+        sequence_lengths="[3]",
+        compression='{ levels = ["none"] }',
+    )
+    result = run_study(plan, tmp_path / "study", workers=0)
+    assert result.n_ok == len(speeds)
+    records = read_study(tmp_path / "study")
+    for of_each in ("run_id", "similarity_key", "dataset", "truth"):
+        assert len({getattr(record, of_each) for record in records}) == len(speeds)
+    by_name = {record.dataset: record for record in records}
+    for dataset in plan.datasets:
+        record, query, reference = by_name[dataset.name], dataset.query(), dataset.reference()
+        route = rt.build_map(reference, rt.technique("tiny"))
+        scores = rt.similarity(query, route)
+        kept = load_matrix(tmp_path / "study" / "cache", record.similarity_key)
+        assert kept is not None
+        # A row for every frame of the drive, also where one picture is there several times.
+        assert np.abs(kept - scores).max() < 1e-6
+        matches = rt.match(query, route, sequence_length=3)
+        assert record.answer_reference == tuple(matches.reference)
+        assert record.accuracy == evaluate(matches, dataset.truth()).accuracy
+        assert (record.n_queries, record.n_references) == (len(query), len(reference))
 
 
 def test_entropy_is_measured_where_asked(data: Path, tmp_path: Path) -> None:

@@ -3,7 +3,7 @@ import pytest
 
 from retraverse.datasets import aligned
 from retraverse.errors import ConfigError, InputError
-from retraverse.studies.jpeg_ablation import JPEG_PARTS, ablate
+from retraverse.studies.jpeg_ablation import ABLATED_PARTS, ablate
 from retraverse.techniques import technique
 from retraverse.types import ImageArray
 
@@ -21,7 +21,7 @@ def test_every_part_is_compared_window_by_window() -> None:
     points = ablate(
         drive(1), drive(2), aligned(7, 7, 0), techniques, compression=97, sequence_lengths=(1, 3)
     )
-    assert len(points) == 2 * len(JPEG_PARTS)
+    assert len(points) == 2 * len(ABLATED_PARTS)
     clean = {point.sequence_length: point for point in points if point.part == "clean"}
     assert clean[1].accuracy == 1
     for point in points:
@@ -34,7 +34,7 @@ def test_every_part_is_compared_window_by_window() -> None:
 
 def test_means_of_blocks_suffice_where_places_are_made_of_blocks() -> None:
     techniques = {"sad": technique("sad")}
-    chosen = [part for part in JPEG_PARTS if part.name == "1 bands in blocks"]
+    chosen = [part for part in ABLATED_PARTS if part.name == "1 bands in blocks"]
     (point,) = ablate(
         drive(1),
         drive(2),
@@ -47,10 +47,10 @@ def test_means_of_blocks_suffice_where_places_are_made_of_blocks() -> None:
 
 
 def test_names_are_unique_and_said() -> None:
-    names = [part.name for part in JPEG_PARTS]
+    names = [part.name for part in ABLATED_PARTS]
     assert len(set(names)) == len(names)
     assert names[0] == "clean"
-    assert all(part.summary for part in JPEG_PARTS)
+    assert all(part.summary for part in ABLATED_PARTS)
 
 
 def test_truth_of_another_drive_and_c_out_of_range() -> None:

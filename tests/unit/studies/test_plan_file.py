@@ -8,7 +8,8 @@ import pytest
 from tests.unit.studies.tiny import write_dataset
 
 from retraverse.errors import DataMissingError
-from retraverse.images import Encoder
+from retraverse.images import Encoder, VideoGroups, Worsening
+from retraverse.images.jpeg_parts import JPEG_PARTS
 from retraverse.images.quantisation import STANDARD_TABLES
 from retraverse.studies.plan import StudyPlan, TechniqueChoice, compression_pairs
 from retraverse.studies.plan_file import PlanError, load_plan, read_plan
@@ -77,6 +78,32 @@ def test_query_and_map_levels_of_their_own(data: Path) -> None:
     assert pairs == [(0, None), (0, 90), (0, 99), (50, None), (50, 90), (50, 99)]
 
 
+def test_parts_of_jpeg_need_a_compression(data: Path) -> None:
+    lines = 'compression = { levels = ["none", 97], parts = ["whole", "grid"] }'
+    ways = [(pair.query, pair.reference) for pair in plan_of(data, lines).pairs]
+    assert all(query == reference for query, reference in ways)
+    assert [(way.compression, way.part) for way, _ in ways] == [(None, ""), (97, ""), (97, "grid")]
+    every = plan_of(data, 'compression = { levels = [97], parts = ["every"] }').pairs
+    assert [pair.query.part for pair in every] == ["", *JPEG_PARTS]
+
+
+def test_video_is_sent_beside_jpeg_files(data: Path) -> None:
+    pytest.importorskip("av", reason="the extra 'video' is not installed")
+    lines = """
+        images = { resize = [64] }
+        compression = { query = [50], reference = ["none"] }
+        video = { h265 = [30, 40], av1 = [50], group = 4 }
+        """
+    pairs = plan_of(data, lines).pairs
+    assert [pair.query.video for pair in pairs] == [
+        None,
+        VideoGroups("h265", 30, 4),
+        VideoGroups("h265", 40, 4),
+        VideoGroups("av1", 50, 4),
+    ]
+    assert {pair.reference for pair in pairs} == {Worsening(64)}
+
+
 def test_a_parameter_follows_the_size_of_the_pictures(data: Path) -> None:
     technique = '{ name = "hog", parameters = { form = "chapter7", resolution = "resized" } }'
     plan = plan_of(data, f"techniques = [{technique}]\nimages = {{ resize = [16, 64] }}")
@@ -92,6 +119,23 @@ def test_datasets_of_ones_own(data: Path) -> None:
     assert [dataset.truth().tolerance_frames for dataset in plan.datasets] == [2, 1]
 
 
+def test_every_dataset_at_every_speed(data: Path) -> None:
+    plan = plan_of(data, 'speeds = ["constant", "stops", "constant", "jump"]')
+    names = [dataset.name for dataset in plan.datasets]
+    assert names == ["noise", "noise, with stops", "noise, with jumps"]
+    assert plan.n_runs == 3
+
+
+def test_a_drive_too_short_for_another_speed(tmp_path: Path) -> None:
+    write_dataset(tmp_path / "noise", n_frames=9)
+    assert plan_of(tmp_path, "").n_runs == 1
+    with pytest.raises(PlanError) as raised:
+        plan_of(tmp_path, 'speeds = ["constant", "varying"]')
+    (problem,) = raised.value.problems
+    assert problem.startswith("dataset noise, varying speed: ")
+    assert problem.endswith("got a drive of 9 frames, expected at least 10")
+
+
 @pytest.mark.parametrize(
     ("lines", "problem"),
     [
@@ -101,6 +145,8 @@ def test_datasets_of_ones_own(data: Path) -> None:
         ('datasets = ["nois"]', "dataset nois: not in "),
         ('datasets = ["noise", "noise"]', "datasets: noise is there twice"),
         ('datasets = ["corridor"]', "dataset corridor: not in "),
+        ('speeds = ["constnt"]', "unknown speed in speeds: got 'constnt', expected one of const"),
+        ("speeds = [2]", "speeds: got 2, expected a text"),
         ("datasets = [1]", "datasets: got 1, expected a text or a table"),
         ('datasets = [{ name = "a" }]', "expected name, query and reference"),
         (
@@ -141,6 +187,11 @@ def test_datasets_of_ones_own(data: Path) -> None:
         ("compression = { levels = [100] }", "compression.levels: got 100, expected whole"),
         ('compression = { pairs = ["all"] }', "unknown compression.pairs: got 'all'"),
         ("compression = { levels = [0], query = [0] }", "got levels and query"),
+        ('compression = { parts = ["gird"] }', "unknown compression.parts: got 'gird'"),
+        ("video = { h264 = [30] }", "unknown key in video: got 'h264'"),
+        ("video = { h265 = [52] }", "quality of h265: got 52, expected 0 to 51"),
+        ("video = { h265 = [30], group = 5 }", "video.group: got 5, expected 1, 2, 4"),
+        ("legibility = true", "legibility: got pictures that are not resized"),
     ],
 )
 def test_what_can_be_wrong(data: Path, lines: str, problem: str) -> None:

@@ -11,6 +11,7 @@ from retraverse.studies.reproduce import CHAPTERS, chapter_plans, datasets_here
 
 LEVELS = (0, 50, 80, 90, 95, 97, 99)
 """studies.md's compressions, chapters 5 and 6."""
+SPEEDS = ("", ", varying speed", ", with stops", ", with jumps")
 
 
 @pytest.fixture
@@ -23,9 +24,10 @@ def data(tmp_path: Path) -> Path:
 def test_every_chapter_has_a_plan_on_what_is_here(data: Path) -> None:
     plans = chapter_plans(data)
     assert {plan.chapter for plan in plans} == set(CHAPTERS)
+    assert [plan.chapter for plan in plans][-2:] == ["beyond", "beyond"]
     known = {info.name for info in rt.techniques()}
     for plan in plans:
-        assert [dataset.name for dataset in plan.datasets] == ["corridor"]
+        assert plan.datasets[0].name == "corridor"
         assert "nordland" in plan.missing
         assert {choice.name for choice in plan.techniques} <= known
         assert plan.n_runs > 0
@@ -43,6 +45,8 @@ def test_the_chapters_ask_for_what_the_thesis_has(data: Path) -> None:
         uniform = {(level, level) for level in LEVELS}
         one_sided = {(level, 0) for level in LEVELS} | {(0, level) for level in LEVELS}
         assert pairs == uniform | one_sided
+    speeds = [dataset.name for dataset in of_chapter["changing speed"].datasets]
+    assert speeds == [f"corridor{words}" for words in SPEEDS]
     sizes = {pair.query.resize for pair in of_chapter["chapter 7"].pairs}
     assert sizes == {16, 32, 64, 128, 256, 512, 1024}
     assert {pair.query.compression for pair in of_chapter["chapter 7"].pairs} == {25}

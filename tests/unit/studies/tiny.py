@@ -18,7 +18,7 @@ from retraverse.studies.plan_file import read_plan
 from retraverse.studies.records import RunRecord
 from retraverse.techniques import ArraySpec, Description, Descriptions, Layout
 from retraverse.techniques import registry as technique_registry
-from retraverse.techniques.vectors import cosine_similarity
+from retraverse.techniques.summarising.vectors import cosine_similarity
 from retraverse.types import FloatArray, ImageArray
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -14,7 +14,7 @@ from retraverse.techniques.networks.deepseqslam import (
     window_positions,
     windows,
 )
-from retraverse.techniques.torch_runtime import torch_threads
+from retraverse.techniques.running.torch_runtime import torch_threads
 from retraverse.types import FloatArray, ImageArray
 
 N_FRAMES, LENGTH = 14, 4

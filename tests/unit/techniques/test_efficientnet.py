@@ -10,7 +10,7 @@ import retraverse as rt
 from retraverse.errors import ConfigError
 from retraverse.techniques.efficientnet import _BLOCKS, EfficientNet, EfficientNetParameters
 from retraverse.techniques.networks.efficientnet_lite import LITE0_BLOCKS, EfficientNetLite0
-from retraverse.techniques.torch_runtime import torch_threads
+from retraverse.techniques.running.torch_runtime import torch_threads
 from retraverse.weights.store import load_tensors
 
 CAT, ESPRESSO = 285, 967

@@ -11,8 +11,8 @@ from tests.unit.techniques.tiny_network import pictures
 import retraverse as rt
 from retraverse.errors import ConfigError, DataMissingError
 from retraverse.techniques.networks.squeezenet import SqueezeNet as Network
+from retraverse.techniques.running.torch_runtime import torch_threads
 from retraverse.techniques.squeezenet import SqueezeNet, SqueezeNetParameters
-from retraverse.techniques.torch_runtime import torch_threads
 from retraverse.weights.store import load_tensors
 
 CAT, ESPRESSO = 285, 967

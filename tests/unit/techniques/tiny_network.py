@@ -10,9 +10,9 @@ import torch
 from safetensors.numpy import save_file
 
 from retraverse.techniques import ArraySpec, Layout
-from retraverse.techniques.learned import LearnedParameters, LearnedTechnique
 from retraverse.techniques.parameters import parameter
-from retraverse.techniques.preparation import channels_first, resized
+from retraverse.techniques.preparing.network_input import channels_first, resized
+from retraverse.techniques.running.learned import LearnedParameters, LearnedTechnique
 from retraverse.types import Array, FloatArray, ImageArray
 
 __all__ = ["TinyParameters", "TinyTechnique", "pictures", "write_tiny_weights"]

@@ -10,7 +10,7 @@ from PIL import Image
 from torch import Tensor, nn
 
 from retraverse.techniques.base import ArraySpec, Layout
-from retraverse.techniques.learned import LearnedParameters, LearnedTechnique
+from retraverse.techniques.running.learned import LearnedParameters, LearnedTechnique
 from retraverse.training.loop import LoopSettings
 from retraverse.types import Array, FloatArray, ImageArray
 

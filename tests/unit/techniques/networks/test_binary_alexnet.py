@@ -9,7 +9,7 @@ from tests.unit.techniques.seeded_weights import state_of
 
 from retraverse.errors import InputError
 from retraverse.techniques.networks.binary_alexnet import BINARY_NETS, BinaryAlexNet
-from retraverse.techniques.torch_runtime import torch_threads
+from retraverse.techniques.running.torch_runtime import torch_threads
 from retraverse.types import Array
 
 Tensors = dict[str, Array]

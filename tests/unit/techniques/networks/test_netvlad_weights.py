@@ -10,7 +10,7 @@ from tests.unit.techniques.seeded_weights import state_of
 from retraverse.errors import InputError
 from retraverse.techniques.networks.mobilenet_netvlad import MobileNetNetVlad
 from retraverse.techniques.networks.vgg_netvlad import VGG16_CONVOLUTIONS, VggNetVlad
-from retraverse.techniques.torch_runtime import torch_threads
+from retraverse.techniques.running.torch_runtime import torch_threads
 from retraverse.types import Array
 
 Tensors = dict[str, Array]

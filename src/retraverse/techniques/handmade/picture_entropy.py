@@ -3,7 +3,7 @@
 import numpy as np
 
 from retraverse import kernels
-from retraverse.techniques.regional_hog import ENTROPY_RADIUS, ENTROPY_SIDE
+from retraverse.techniques.handmade.regional_hog import ENTROPY_RADIUS, ENTROPY_SIDE
 from retraverse.types import ImageArray
 
 __all__ = ["picture_entropy"]

@@ -29,12 +29,12 @@ import numpy as np
 from retraverse.errors import ConfigError
 from retraverse.images import STRONG_TRACES, Frame, jpeg_traces
 from retraverse.techniques.base import Description, Descriptions, Layout
-from retraverse.techniques.batching import Runner, fastest_batch, slices
-from retraverse.techniques.extras import import_extra
-from retraverse.techniques.file_digest import file_digest
 from retraverse.techniques.parameters import check_range, parameter
-from retraverse.techniques.pooling import flat, unit_rows
-from retraverse.techniques.vectors import cosine_similarity
+from retraverse.techniques.running.batching import Runner, fastest_batch, slices
+from retraverse.techniques.running.extras import import_extra
+from retraverse.techniques.running.file_digest import file_digest
+from retraverse.techniques.summarising.pooling import flat, unit_rows
+from retraverse.techniques.summarising.vectors import cosine_similarity
 from retraverse.types import Array, FloatArray, ImageArray
 from retraverse.weights.store import (
     CLEAN_WEIGHTS,
@@ -279,13 +279,13 @@ class LearnedTechnique(ABC):
 
 
 def _torch_runner(technique: LearnedTechnique) -> Runner:
-    from retraverse.techniques.torch_runtime import TorchRunner
+    from retraverse.techniques.running.torch_runtime import TorchRunner
 
     return TorchRunner(technique.network(), technique.parameters.threads)
 
 
 def _onnx_runner(technique: LearnedTechnique) -> Runner:
-    from retraverse.techniques.onnx_runtime import onnx_runner
+    from retraverse.techniques.running.onnx_runtime import onnx_runner
 
     return onnx_runner(technique)
 

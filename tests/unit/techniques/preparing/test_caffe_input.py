@@ -7,7 +7,7 @@ import pytest
 
 import retraverse as rt
 from retraverse.errors import DataMissingError, InputError
-from retraverse.techniques.caffe_preparation import (
+from retraverse.techniques.preparing.caffe_input import (
     IMAGENET_MEAN_BGR,
     equalised,
     find_mean,

@@ -10,9 +10,10 @@ from tests.unit.techniques.tiny_network import TinyTechnique, pictures, write_ti
 
 from retraverse.errors import ConfigError, DataMissingError, InputError
 from retraverse.images import Frame
-from retraverse.techniques import Descriptions, onnx_runtime
-from retraverse.techniques.onnx_runtime import OnnxRunner, export_onnx, graph_path
-from retraverse.techniques.quantise import QuantisedGraph, quantise
+from retraverse.techniques import Descriptions
+from retraverse.techniques.running import onnx_runtime
+from retraverse.techniques.running.onnx_runtime import OnnxRunner, export_onnx, graph_path
+from retraverse.techniques.running.quantise import QuantisedGraph, quantise
 
 
 def tiny(weights: Path, **parameters: Any) -> TinyTechnique:

@@ -3,8 +3,8 @@ from typing import Any
 
 import pytest
 
-from retraverse.techniques import batching
-from retraverse.techniques.batching import MOST_AT_ONCE, fastest_batch, slices
+from retraverse.techniques.running import batching
+from retraverse.techniques.running.batching import MOST_AT_ONCE, fastest_batch, slices
 from retraverse.types import FloatArray
 
 

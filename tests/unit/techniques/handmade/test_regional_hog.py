@@ -9,7 +9,7 @@ import retraverse as rt
 from retraverse.errors import ConfigError
 from retraverse.images import Frame
 from retraverse.techniques import Descriptions, RegionalTechnique
-from retraverse.techniques.regional_hog import MAX_ENTROPY
+from retraverse.techniques.handmade.regional_hog import MAX_ENTROPY
 from retraverse.types import ImageArray
 
 

@@ -22,8 +22,8 @@ from retraverse.errors import ConfigError, DataMissingError, MapError, MissingEx
 from retraverse.images import Frame, decode_bgr, encode_jpeg
 from retraverse.maps import TechniqueRecord
 from retraverse.techniques import BatchTechnique, FingerprintedTechnique, registry
-from retraverse.techniques.file_digest import file_digest
-from retraverse.techniques.torch_runtime import torch_threads
+from retraverse.techniques.running.file_digest import file_digest
+from retraverse.techniques.running.torch_runtime import torch_threads
 from retraverse.types import ImageArray
 from retraverse.weights.store import CLEAN_WEIGHTS
 

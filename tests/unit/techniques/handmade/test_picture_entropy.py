@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import retraverse as rt
-from retraverse.techniques.picture_entropy import picture_entropy
+from retraverse.techniques.handmade.picture_entropy import picture_entropy
 
 
 @pytest.mark.parametrize("shape", [(32, 64), (120, 160), (384, 1024), (512, 512)])

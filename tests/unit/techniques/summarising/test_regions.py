@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from retraverse.errors import InputError
-from retraverse.techniques.regions import (
+from retraverse.techniques.summarising.regions import (
     build_clusters,
     nearest_cluster,
     region_features,

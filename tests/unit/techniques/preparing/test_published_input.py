@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from retraverse.techniques.published_input import (
+from retraverse.techniques.preparing.published_input import (
     Filter,
     imagenet_normalised,
     resized_8_bit,

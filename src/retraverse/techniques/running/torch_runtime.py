@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from retraverse.techniques.extras import import_extra
+from retraverse.techniques.running.extras import import_extra
 from retraverse.types import FloatArray
 
 if TYPE_CHECKING:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from retraverse.techniques.random_projection import gaussian_projection
+from retraverse.techniques.summarising.random_projection import gaussian_projection
 
 # np.random.seed(0); np.random.randn(): the first numbers, as NumPy's own documentation
 # and many a tutorial print them.

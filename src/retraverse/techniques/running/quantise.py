@@ -16,9 +16,9 @@ from retraverse.errors import InputError
 from retraverse.files import check_writable_place, write_whole
 from retraverse.images import Frame
 from retraverse.techniques.base import Descriptions
-from retraverse.techniques.extras import import_extra
-from retraverse.techniques.learned import ONNX_SUFFIX, LearnedTechnique
-from retraverse.techniques.onnx_runtime import INPUT_NAME, graph_bytes, quiet_exporter
+from retraverse.techniques.running.extras import import_extra
+from retraverse.techniques.running.learned import ONNX_SUFFIX, LearnedTechnique
+from retraverse.techniques.running.onnx_runtime import INPUT_NAME, graph_bytes, quiet_exporter
 from retraverse.types import FloatArray, Progress, no_progress
 
 __all__ = ["QuantisedGraph", "quantise"]

@@ -91,7 +91,9 @@ class RegionalHog:
                 "entropy": ArraySpec((), "float64"),
             },
         )
-        self._warned_of_empty_roi = False
+        self.warns_of_empty_roi = True
+        """Whether the next picture without a region of interest is said in a warning. False once
+        it was; who counts such pictures and says it for many drives at once sets it, too."""
 
     def read(self, frame: Frame) -> ImageArray:
         """Return the picture in grey, by the path the parameters name."""
@@ -127,13 +129,30 @@ class RegionalHog:
         """
         threshold = np.float32(self.parameters.roi_entropy)
         chosen: BoolArray = np.asarray(queries.arrays["region_entropy"] >= threshold)
-        empty = np.asarray(~chosen.any(axis=1))
+        empty = self.empty_roi(queries)
         if empty.any():
-            self._warn_of_empty_roi(int(empty.sum()), len(queries))
+            if self.warns_of_empty_roi:
+                self.warns_of_empty_roi = False
+                self.warn_of_empty_roi(int(empty.sum()), len(queries))
             chosen = chosen | empty[:, np.newaxis]
         counts = chosen.sum(axis=1, keepdims=True, dtype=np.float32)
         weights: FloatArray = chosen / np.maximum(counts, np.float32(1))
         return weights
+
+    def empty_roi(self, queries: Descriptions) -> BoolArray:
+        """Return which pictures have no region of interest, bool (Q,)."""
+        threshold = np.float32(self.parameters.roi_entropy)
+        return np.asarray(~(queries.arrays["region_entropy"] >= threshold).any(axis=1))
+
+    def warn_of_empty_roi(self, n_empty: int, n_pictures: int) -> None:
+        """Say in a warning how many pictures have no region of interest, and what is done."""
+        logger.warning(
+            "%d of %d pictures have no region with entropy >= roi_entropy %.3g; "
+            "all their regions are matched instead (dark or flat pictures? lower roi_entropy)",
+            n_empty,
+            n_pictures,
+            self.parameters.roi_entropy,
+        )
 
     def weighted_similarity(
         self, query: Array, references: Array, weights: FloatArray
@@ -161,15 +180,3 @@ class RegionalHog:
         if self.parameters.precision == "float32":
             return histograms
         return kernels.quantise_regions(histograms)
-
-    def _warn_of_empty_roi(self, n_empty: int, n_queries: int) -> None:
-        if self._warned_of_empty_roi:
-            return
-        self._warned_of_empty_roi = True
-        logger.warning(
-            "%d of %d pictures have no region with entropy >= roi_entropy %.3g; "
-            "all their regions are matched instead (dark or flat pictures? lower roi_entropy)",
-            n_empty,
-            n_queries,
-            self.parameters.roi_entropy,
-        )

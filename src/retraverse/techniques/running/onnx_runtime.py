@@ -18,10 +18,10 @@ import numpy as np
 
 from retraverse.errors import InputError, RetraverseError
 from retraverse.files import check_writable_place, write_whole
-from retraverse.techniques.batching import Runner
-from retraverse.techniques.extras import import_extra
-from retraverse.techniques.learned import ONNX_SUFFIX, LearnedTechnique
 from retraverse.techniques.parameters import uncompared_parameters
+from retraverse.techniques.running.batching import Runner
+from retraverse.techniques.running.extras import import_extra
+from retraverse.techniques.running.learned import ONNX_SUFFIX, LearnedTechnique
 from retraverse.types import FloatArray
 
 __all__ = [

@@ -4,7 +4,7 @@ import torch
 from torch.nn import functional
 
 from retraverse.errors import ConfigError, ShapeError
-from retraverse.techniques import pooling
+from retraverse.techniques.summarising import pooling
 from retraverse.types import FloatArray
 
 

@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from retraverse.techniques.preparation import channels_first
+from retraverse.techniques.preparing.network_input import channels_first
 from retraverse.types import Array, FloatArray, ImageArray
 
 __all__ = ["Filter", "imagenet_normalised", "resized_8_bit", "resized_float"]

@@ -1,0 +1,3 @@
+"""What techniques without a network compute: gradients, filters, entropy."""
+
+__all__: list[str] = []

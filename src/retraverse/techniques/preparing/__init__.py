@@ -1,0 +1,3 @@
+"""How pictures are prepared for networks, as the program of each had them."""
+
+__all__: list[str] = []
