@@ -190,6 +190,20 @@ def test_a_click_on_a_row_opens_its_run(open_page: Opener, report: Path) -> None
     assert opened.is_quiet()
 
 
+def test_a_value_says_which_run_it_opens(open_page: Opener, report: Path) -> None:
+    opened = open_page((report / "chapter-6.html").as_uri())
+    button = opened.page.locator("table.sortable .open-run").first
+    assert button.get_attribute("title") is None
+    button.hover()
+    title = button.get_attribute("title") or ""
+    assert title.startswith("Open the run: cohog on Campus Loop, K = ")
+    assert title.endswith("256 px")
+    other = opened.page.locator("table.sortable .open-run").nth(1)
+    other.focus()
+    assert (other.get_attribute("title") or "").startswith("Open the run: ")
+    assert opened.is_quiet()
+
+
 def test_a_click_on_a_point_opens_its_run(open_page: Opener, report: Path) -> None:
     opened = open_page((report / "chapter-4.html").as_uri())
     page = opened.page

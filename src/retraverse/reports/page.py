@@ -8,6 +8,7 @@ from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 from retraverse.reports import wording
+from retraverse.reports.lean_svg import shared_marks
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -47,7 +48,7 @@ def render_page(
             script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
         )
     )
-    return page.lstrip()
+    return shared_marks(page).lstrip()
 
 
 @cache
@@ -61,9 +62,13 @@ def _environment() -> "Environment":
         undefined=StrictUndefined,
     )
     environment.globals.update(wording=wording)
+    environment.policies["json.dumps_kwargs"] = {"separators": (",", ":")}
     environment.filters["subscripts"] = wording.subscripts
     return environment
 
 
 def _resource(name: str) -> str:
-    return (resources.files("retraverse.reports") / "templates" / name).read_text("utf-8")
+    """Return a style sheet or script without indents and lines that are only a comment."""
+    text = (resources.files("retraverse.reports") / "templates" / name).read_text("utf-8")
+    lines = (line.strip() for line in text.splitlines())
+    return "\n".join(line for line in lines if line and not line.startswith("//"))

@@ -6,6 +6,7 @@ follows the page it stands in (light, dark, print). Text stays text.
 
 import base64
 import io
+import json
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,7 +14,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from markupsafe import Markup, escape
+from markupsafe import Markup
+
+from retraverse.reports.lean_svg import lean_svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -103,6 +106,17 @@ class Plot:
     """What it shows, for those who cannot see it."""
     span: Span
 
+    @property
+    def span_data(self) -> Markup:
+        """Return the span as JSON for an attribute in single quotes."""
+        found = self.span
+        values = {
+            **{name: round(getattr(found, name), 4) for name in ("left", "top", "width", "height")},
+            "x": [float(f"{value:.9g}") for value in found.x],
+            "y": [float(f"{value:.9g}") for value in found.y],
+        }
+        return Markup(json.dumps(values, separators=(",", ":")))  # numbers alone: nothing to escape
+
 
 @contextmanager
 def drawing(name: str) -> Iterator[None]:
@@ -143,7 +157,10 @@ def export(figure: "Figure", axes: "Axes", alt: str) -> Plot:
 def standalone(plot: Plot) -> str:
     """Return a figure as the text of an SVG file of its own, in the light page's colours."""
     text = re.sub(r"var\(--([a-z0-9-]+)\)", lambda found: COLOURS[found[1]], str(plot.svg))
-    head = '<?xml version="1.0" encoding="utf-8"?>\n<svg xmlns="http://www.w3.org/2000/svg" '
+    # Not every program that takes SVG knows the plain name yet.
+    text = re.sub(r"<(use|image) href=", r"<\1 xlink:href=", text)
+    spaces = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
+    head = f'<?xml version="1.0" encoding="utf-8"?>\n<svg {spaces} '
     return text.replace("<svg ", head, 1) + "\n"
 
 
@@ -154,15 +171,11 @@ def _span(axes: "Axes") -> Span:
 
 
 def _inline(text: str, alt: str) -> str:
-    text = text[text.index("<svg") :].strip()
-    text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, count=1, flags=re.DOTALL)
-    box = re.search(r'viewBox="[^"]*"', text)
-    head = f'<svg xmlns:xlink="http://www.w3.org/1999/xlink" {box[0] if box else ""}'
-    text = re.sub(r"<svg[^>]*>", f'{head} role="img" aria-label="{escape(alt)}">', text, count=1)
-    text = re.sub(r"data:image/png;base64,([A-Za-z0-9+/=\s]+)", _lean_png, _without_idle_ids(text))
+    lean = lean_svg(text, alt)
+    lean = re.sub(r"data:image/png;base64,([A-Za-z0-9+/=]+)", _lean_png, lean)
     for name, value in COLOURS.items():
-        text = text.replace(value, f"var(--{name})")
-    return re.sub(r"\n\s*", "\n", text)
+        lean = lean.replace(value, f"var(--{name})")
+    return lean
 
 
 def _lean_png(match: re.Match[str]) -> str:
@@ -181,15 +194,3 @@ def _lean_png(match: re.Match[str]) -> str:
     buffer = io.BytesIO()
     lean.save(buffer, "PNG", optimize=True, transparency=channels[:, 3].tobytes())
     return f"data:image/png;base64,{base64.b64encode(buffer.getvalue()).decode()}"
-
-
-def _without_idle_ids(text: str) -> str:
-    """Drop ids that nothing refers to; an id "layer-x" becomes a class."""
-    used = set(re.findall(r'(?:url\(#|href="#)([^")]+)', text))
-
-    def keep(match: re.Match[str]) -> str:
-        if match[1].startswith("layer-"):
-            return f' class="{match[1]}"'
-        return match[0] if match[1] in used else ""
-
-    return re.sub(r' id="([^"]+)"', keep, text)

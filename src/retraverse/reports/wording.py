@@ -14,6 +14,7 @@ __all__ = [
     "length_text",
     "percent",
     "plain",
+    "points",
     "ratio",
     "seconds",
     "signed",
@@ -40,6 +41,14 @@ def ratio(value: float | None) -> str:
 def signed(value: float) -> str:
     """Return a number with two decimals and a true minus sign: -0.1 -> "−0.10"."""
     return f"{value:.2f}".replace("-", "−")
+
+
+def points(value: float) -> str:
+    """Return a difference of shares in percentage points with its sign: -3.21 -> "−3.2"."""
+    if math.isnan(value):
+        return NOTHING
+    # Adding 0 makes a rounded -0 a plain one.
+    return f"{round(value, 1) + 0.0:+.1f}".replace("-", "−")
 
 
 def subscripts(text: str) -> Markup:

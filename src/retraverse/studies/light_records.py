@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from retraverse.errors import DataMissingError, InputError
-from retraverse.studies.records import RunRecord, record_files
+from retraverse.studies.records import NEEDED_COLUMNS, RunRecord, record_files
 
 __all__ = ["LONG_COLUMNS", "read_light_records", "study_folders", "with_long_columns"]
 
@@ -28,7 +28,7 @@ LONG_COLUMNS = (
 """Fields of a `RunRecord` that `read_light_records` leaves at their defaults."""
 
 _light = tuple(field.name for field in fields(RunRecord) if field.name not in LONG_COLUMNS)
-_floats = {field.name for field in fields(RunRecord) if field.type in (float, "float")}
+_defaults = {field.name: field.default for field in fields(RunRecord)}
 _at_once = 500
 """Runs whose long columns are asked for in one question to the database."""
 
@@ -103,7 +103,15 @@ def _rows(
     settings: dict[str, Any] = {"threads": 1, "autoload_known_extensions": False}
     try:
         with duckdb.connect(config=settings) as database:
-            question = f"SELECT {', '.join(columns)} FROM read_parquet(?) {where}"
+            schema = "SELECT DISTINCT name FROM parquet_schema(?)"
+            there = {row[0] for row in database.execute(schema, [files]).fetchall()}
+            # Records of an earlier version lack the columns that came later.
+            asked = [
+                name if name in there or name in NEEDED_COLUMNS else f"NULL AS {name}"
+                for name in columns
+            ]
+            source = "read_parquet(?, union_by_name = true)"
+            question = f"SELECT {', '.join(asked)} FROM {source} {where}"
             return database.execute(question, [files, *values]).fetchall()
     except duckdb.Error as error:
         reason = " ".join(str(error).split())
@@ -118,8 +126,8 @@ def _record(columns: Sequence[str], row: Sequence[Any]) -> RunRecord:
 
 
 def _value(name: str, value: Any) -> Any:
-    if name in _floats:
-        return math.nan if value is None else value
+    if value is None:
+        return _defaults[name]
     if isinstance(value, list):
         return tuple(math.nan if item is None else item for item in value)
     return value

@@ -15,15 +15,17 @@ import json
 import math
 import os
 import secrets
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, fields
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal, get_type_hints
 
 from retraverse.errors import DataMissingError, InputError
 
 __all__ = [
+    "NEEDED_COLUMNS",
     "PERISHABLE",
     "RunRecord",
     "Status",
@@ -174,6 +176,8 @@ class RunRecord:
 
 
 _columns = tuple(field.name for field in fields(RunRecord))
+NEEDED_COLUMNS = ("run_id", "study", "dataset", "technique")
+"""Without these a file holds no records."""
 _parquet_types = {
     int: "BIGINT",
     float: "DOUBLE",
@@ -267,14 +271,23 @@ def _schema() -> str:
 
 
 def _read_file(path: Path) -> list[RunRecord]:
-    return [_record(row) for row in _select(", ".join(_columns), path)]
+    # Records of an earlier version lack the columns that came later: these keep their defaults.
+    there = {row[0] for row in _select("name", path, "parquet_schema")}
+    columns = [name for name in _columns if name in there or name in NEEDED_COLUMNS]
+    readers = [_readers()[name] for name in columns]
+    return [
+        RunRecord(
+            **{name: read(value) for name, read, value in zip(columns, readers, row, strict=True)}
+        )
+        for row in _select(", ".join(columns), path)
+    ]
 
 
-def _select(columns: str, path: Path) -> list[Any]:
+def _select(columns: str, path: Path, function: str = "read_parquet") -> list[Any]:
     import duckdb
 
     try:
-        query = f"SELECT {columns} FROM read_parquet(?)"
+        query = f"SELECT {columns} FROM {function}(?)"
         return list(_database().execute(query, [str(path)]).fetchall())
     except duckdb.Error as error:
         raise InputError(
@@ -282,21 +295,21 @@ def _select(columns: str, path: Path) -> list[Any]:
         ) from error
 
 
-def _record(row: tuple[Any, ...]) -> RunRecord:
-    return RunRecord(
-        **{
-            name: reader(value)
-            for name, reader, value in zip(_columns, _readers(), row, strict=True)
-        }
-    )
-
-
-def _readers() -> list[Any]:
+@lru_cache(maxsize=1)
+def _readers() -> dict[str, Callable[[Any], Any]]:
+    """Return what makes a field of a column's value."""
     hints = get_type_hints(RunRecord)
-    special = {float: _number, tuple[float, ...]: _numbers}
-    return [
-        special.get(hints[name], tuple if _is_list(hints[name]) else _same) for name in _columns
-    ]
+    return {name: _reader_of(hints[name]) for name in _columns}
+
+
+def _reader_of(hint: Any) -> Callable[[Any], Any]:
+    if hint is float:
+        return _number
+    if hint == tuple[float, ...]:
+        return _numbers
+    if _is_list(hint):
+        return tuple
+    return _same
 
 
 def _is_list(hint: Any) -> bool:

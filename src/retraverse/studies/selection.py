@@ -60,7 +60,7 @@ class Condition:
     @property
     def is_uniform(self) -> bool:
         """Say whether query and map pictures are compressed alike."""
-        return self.compression_query == self.compression_reference
+        return self.compression_query == self.compression_reference and not self.video
 
 
 Curve = tuple[RunRecord, ...]

@@ -39,7 +39,9 @@ def test_one_warning_a_study(
     assert result.n_ok == 2 * 4 * 3 * 2
     # Two datasets at four pairs of c each.
     (said,) = said_by(caplog)
-    assert said.startswith(f"{2 * 4 * N} of {2 * 4 * N} pictures have no region with entropy >= ")
+    assert said.startswith(
+        f"cohog: {2 * 4 * N} of {2 * 4 * N} pictures have no region with entropy >= "
+    )
     assert "no region" not in capfd.readouterr().err, "workers leave it to the one who counts"
 
 

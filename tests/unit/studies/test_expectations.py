@@ -126,3 +126,12 @@ def test_time_falls_with_resolution() -> None:
 def test_failed_runs_do_not_count() -> None:
     runs = [replace(run, status="failed") for run in lengths(0.9, 0.1)]
     assert judged("accuracy-rises", runs).holds is None
+
+
+@pytest.mark.parametrize("beyond", [{"jpeg_part": "grid"}, {"video": "av1", "video_quality": 40}])
+def test_what_the_thesis_does_not_speak_of_does_not_count(beyond: dict[str, object]) -> None:
+    rises = lengths(0.5, 0.6)
+    falls = [replace(run, **beyond) for run in lengths(0.9, 0.1)]  # type: ignore[arg-type]
+    assert judged("accuracy-rises", [*rises, *falls]) == judged("accuracy-rises", rises)
+    raw = [replace(run, query_bytes_mean=1e6, **beyond) for run in compressed(9000, 4000)]  # type: ignore[arg-type]
+    assert judged("bytes-fall", [*raw, *compressed(9000, 4000)]).holds

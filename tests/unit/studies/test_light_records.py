@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+import duckdb
 import pytest
 from tests.unit.reports.study_report.made_up import make_run, write_study
 
@@ -25,6 +26,23 @@ def test_light_records_lack_the_long_columns_alone(tmp_path: Path) -> None:
         assert {name: getattr(found, name) for name in same} == same
         assert found.answer_query == ()
     assert with_long_columns([tmp_path], light[1:]) == tuple(RUNS[1:])
+
+
+def test_old_records_beside_new_ones_lack_what_came_later(tmp_path: Path) -> None:
+    write_study(tmp_path / "new", [replace(RUNS[0], jpeg_part="grid", group_length=8)])
+    (new,) = (tmp_path / "new" / "records").glob("*.parquet")
+    (tmp_path / "old" / "records").mkdir(parents=True)
+    without = f"SELECT * EXCLUDE (jpeg_part, group_length) FROM read_parquet('{new}')"
+    old = tmp_path / "old" / "records" / "a.parquet"
+    duckdb.connect().execute(f"COPY ({without}) TO '{old}' (FORMAT parquet)")
+    (alone,) = read_light_records([tmp_path / "old"])
+    assert (alone.jpeg_part, alone.group_length) == ("", 0)
+    other = replace(RUNS[1], jpeg_part="grid", group_length=8)
+    write_study(tmp_path / "new", [other], part="b")
+    mixed = read_light_records([tmp_path / "old", tmp_path / "new"])
+    found = {run.run_id: (run.jpeg_part, run.group_length) for run in mixed}
+    assert found[other.run_id] == ("grid", 8)
+    assert len(found) == 2
 
 
 def test_a_repeated_run_counts_once_and_its_result_before_its_failure(tmp_path: Path) -> None:

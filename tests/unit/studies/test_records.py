@@ -9,6 +9,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
+import duckdb
 import pytest
 from tests.unit.studies.fake_records import make_run
 
@@ -43,6 +44,18 @@ def test_missing_numbers_are_nan_again(tmp_path: Path) -> None:
     assert math.isnan(back.accuracy)
     assert back.answer_score[0] == 0.5
     assert all(map(math.isnan, back.answer_score[1:]))
+
+
+def test_records_of_an_earlier_version_lack_what_came_later(tmp_path: Path) -> None:
+    record = make_run(jpeg_part="grid", legible_height=0.1)
+    write_records(tmp_path / "new.parquet", [record])
+    without = "SELECT * EXCLUDE (jpeg_part, legible_height)"
+    duckdb.connect().execute(
+        f"COPY ({without} FROM read_parquet('{tmp_path}/new.parquet')) "
+        f"TO '{tmp_path}/old.parquet' (FORMAT parquet)"
+    )
+    (back,) = read_records(tmp_path / "old.parquet")
+    assert same(back, replace(record, jpeg_part="", legible_height=math.nan))
 
 
 def test_words_that_are_no_unicode_and_quotes(tmp_path: Path) -> None:

@@ -49,11 +49,17 @@ class Cell:
     """Whether it is the best of its column."""
 
     @property
-    def sort_key(self) -> str:
-        """Return what the page sorts by, as text; empty for a number that does not exist."""
+    def sorts_by(self) -> str | None:
+        """Return what the page sorts by; "" for a number that does not exist.
+
+        None where the text says just that: most cells need no second saying.
+        """
         if self.value is None:
-            return self.text
-        return "" if math.isnan(self.value) else f"{self.value:.7g}"
+            key = self.text
+        else:
+            key = "" if math.isnan(self.value) else f"{self.value:.6g}"
+        stands_alone = not (self.note or self.published)
+        return None if stands_alone and key == self.text else key
 
 
 @dataclass(frozen=True)
@@ -115,6 +121,8 @@ class Panel:
     """Names of the places 0, 1, 2 ... of an axis of steps; empty for an axis of numbers."""
     is_log: tuple[bool, bool] = (False, False)
     """Whether x and y are drawn in powers of ten."""
+    technique: str = ""
+    """Technique that all of it belongs to, for the filter; "" = several."""
 
 
 @dataclass(frozen=True)

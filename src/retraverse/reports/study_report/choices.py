@@ -4,10 +4,12 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
+from retraverse.datasets.driven_again import recorded_name
 from retraverse.reports.study_report.artefacts import Cell, Row, Table
 from retraverse.reports.study_report.series import Runs, SeriesBook
 from retraverse.reports.study_report.words import (
     compression_text,
+    damage_text,
     dataset_title,
     length_words,
     meanings,
@@ -62,9 +64,10 @@ def cheapest(
 
 def choices_table(records: Sequence[RunRecord]) -> Table:
     """Return, for every dataset and target, the settings of fewest bytes and of least time."""
-    measured = [run for run in records if run.status == "ok"]
-    # Named without encoder and resizer, which are written beside c where they count.
-    names = Runs([replace(run, encoder="", resizer="") for run in measured], SeriesBook({}))
+    measured = [run for run in records if _can_be_chosen(run)]
+    # Named without encoder, video and resizer, which are written beside c where they count.
+    plain = [replace(run, encoder="", video="", group_length=0, resizer="") for run in measured]
+    names = Runs(plain, SeriesBook({}))
     rows = [
         row
         for dataset in names.datasets
@@ -83,6 +86,11 @@ def choices_table(records: Sequence[RunRecord]) -> Table:
         meanings("window bytes", "time of a frame", "accuracy", "interval", "K", "c", "candidates"),
         lead=4,
     )
+
+
+def _can_be_chosen(run: RunRecord) -> bool:
+    """Say whether a robot could run it: not one part of JPEG, nor a drive made up from another."""
+    return run.status == "ok" and not run.jpeg_part and recorded_name(run.dataset)[1] == "constant"
 
 
 _COSTS: tuple[tuple[str, Callable[[RunRecord], float]], ...] = (
@@ -147,6 +155,8 @@ def _cells(runs: Runs, run: RunRecord) -> tuple[Cell, ...]:
 
 def _compressions(run: RunRecord) -> str:
     query, reference = run.compression_query, run.compression_reference
+    if run.video:
+        return f"{damage_text(run)} query, {compression_text(reference)} map"
     if query == reference:
         return compression_text(query)
     return f"{compression_text(query)} query, {compression_text(reference)} map"

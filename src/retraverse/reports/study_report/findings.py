@@ -3,9 +3,11 @@
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 
+from retraverse.reports.study_report.chapters.beyond.found import beyond_findings
 from retraverse.reports.study_report.choices import cheapest
-from retraverse.reports.study_report.series import Runs, SeriesBook
+from retraverse.reports.study_report.series import Runs, SeriesBook, is_whole, place_of
 from retraverse.reports.study_report.words import (
     compression_text,
     dataset_title,
@@ -33,9 +35,10 @@ def findings(key: str, records: Sequence[RunRecord]) -> tuple[tuple[str, str], .
     judged = [run for run in records if math.isfinite(run.accuracy)]
     runs = Runs(judged, SeriesBook({}))
     found = []
+    beyond = beyond_findings(judged) if key == "beyond" else {}
     for dataset in runs.datasets:
         here = runs.where(_on(dataset))
-        text = _FINDINGS.get(key, _free)(_Spoken(runs), here)
+        text = beyond.get(dataset) or _FINDINGS.get(key, _free)(_Spoken(runs), here)
         if text:
             found.append((dataset_title(dataset), text))
     return tuple(found)
@@ -61,7 +64,8 @@ class _Spoken:
         words = self.runs.series_of(run).label
         if run.sequence_length != "1":
             words += f", {_length(run)}"
-        where = place_text(run) if place else "pictures"
+        # A line of one part of JPEG has its part in its name.
+        where = place_text(replace(run, jpeg_part="")) if place else "pictures"
         return words if where.startswith("pictures") else f"{words}, {where}"
 
     def full(self, run: RunRecord, *, place: bool = False) -> str:
@@ -157,7 +161,7 @@ def _kept(by_step: Mapping[int, Sequence[RunRecord]], least: float) -> int:
 def _by_compression(runs: Iterable[RunRecord]) -> dict[int, list[RunRecord]]:
     found: dict[int, list[RunRecord]] = {}
     for run in runs:
-        if run.compression_query == run.compression_reference:
+        if is_whole(run) and place_of(run).is_uniform:
             found.setdefault(run.compression_query, []).append(run)
     return found
 
@@ -199,41 +203,6 @@ def _chapter_7(said: _Spoken, here: Sequence[RunRecord]) -> str:
     return f"{text}; within its interval the smallest picture is {said.full(small, place=True)}."
 
 
-def _beyond(said: _Spoken, here: Sequence[RunRecord]) -> str:
-    by_step = _by_compression(here)
-    highest = max(by_step, default=None)
-    if highest is None:
-        return ""
-    means = _by_matcher(by_step[highest])
-    top = max(means.values())
-    best = sorted(name for name, mean in means.items() if mean >= top)
-    n_techniques = len({said.runs.series_of(run).technique for run in by_step[highest]})
-    over = f" (mean over {n_techniques} techniques)" if n_techniques > 1 else ""
-    where = "pictures as they are" if highest < 0 else f"c = {highest}"
-    if len(best) == len(means) > 1:
-        return f"at {where} all matchers answer alike, {percent(top)}{over}."
-    names = ", ".join(f"“{name}”" for name in best)
-    text = f"at {where} {names} answers best, {percent(top)}{over}"
-    if len(best) > 1:
-        text = f"at {where} {names} answer best, {percent(top)} each{over}"
-    if "mean" in best or "mean" not in means:
-        return text + "."
-    return f"{text}; the thesis' mean of a sequence has {percent(means['mean'])}."
-
-
-def _by_matcher(runs: Sequence[RunRecord]) -> dict[str, float]:
-    """Return the mean accuracy of every matcher that all techniques were matched with."""
-    found: dict[str, list[RunRecord]] = {}
-    for run in runs:
-        found.setdefault(run.matcher, []).append(run)
-    most = max(map(len, found.values()))
-    return {
-        name: sum(run.accuracy for run in of) / len(of)
-        for name, of in found.items()
-        if len(of) == most
-    }
-
-
 def _free(said: _Spoken, here: Sequence[RunRecord]) -> str:
     best = _best(here)
     return f"most accurate is {said.full(best, place=True)}." if best else ""
@@ -245,5 +214,4 @@ _FINDINGS: Mapping[str, Callable[[_Spoken, Sequence[RunRecord]], str]] = {
     "5": _chapter_5,
     "6": _chapter_6,
     "7": _chapter_7,
-    "beyond": _beyond,
 }

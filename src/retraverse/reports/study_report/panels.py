@@ -25,6 +25,8 @@ MARKS = ("o", "s", "^", "D", "v", "P", "X")
 """Marks of the lines in turn."""
 _N_COLOURS = sum(name.startswith("series-") for name in COLOURS)
 _SIZE = (400, 280)
+_TICK_LETTERS = 56
+"""Names of steps that are longer, all together, stand aslant."""
 _MARKED_POINTS = 24
 """Lines of more points are drawn without a mark at each."""
 
@@ -54,13 +56,19 @@ def draw_lines(
     `name` tells the figure from the others of its page.
     """
     shown = [kept for line in lines if (kept := _finite(line, is_log)).x]
+    slanted = sum(map(len, x_ticks)) > _TICK_LETTERS
+    room = 3.4 * max(map(len, x_ticks)) if slanted else 0.0
     with drawing(f"lines-{slug(name)}-{slug(title)}"):
-        figure, axes = panel(*_SIZE, left=56)
+        figure, axes = panel(_SIZE[0], _SIZE[1] + room, left=56, bottom=44 + room)
         for line in shown:
             _draw_line(axes, line, is_joined=is_joined, has_steps=bool(x_ticks))
         axes.set(xlabel=x_label, ylabel=y_label)
         axes.grid(axis="both" if not is_joined else "y")
         _set_scales(axes, shown, x_ticks, is_log, y_limits)
+        if slanted:
+            axes.tick_params(axis="x", labelrotation=40, labelrotation_mode="anchor")
+            for label in axes.get_xticklabels():
+                label.set_horizontalalignment("right")
         plot = _indexed(export(figure, axes, _alt(title, shown, x_label, y_label, x_ticks)))
     return Panel(title, note, plot, tuple(shown), x_label, y_label, tuple(x_ticks), is_log)
 

@@ -164,9 +164,9 @@ def _compression(run: RunRecord, side: Side) -> int:
 
 
 @lru_cache(maxsize=4096)
-def _worsening(compression: int, encoder: str, resize: int, resizer: str) -> str:
-    parts = [f"c{compression}" if compression >= 0 else "as-is"]
-    if compression >= 0 and encoder:
+def _worsening(damage: str, encoder: str, resize: int, resizer: str) -> str:
+    parts = [damage]
+    if damage.startswith("c") and encoder:
         parts.append(slug(encoder))
     if resize:
         parts.append(f"{resize}px-{slug(resizer)}")
@@ -174,19 +174,34 @@ def _worsening(compression: int, encoder: str, resize: int, resizer: str) -> str
 
 
 def _worsening_name(run: RunRecord, side: Side) -> str:
-    return _worsening(_compression(run, side), run.encoder, run.resize, run.resizer)
+    return _worsening(_damage(run, side), run.encoder, run.resize, run.resizer)
+
+
+def _damage(run: RunRecord, side: Side) -> str:
+    """Return a name for what was done to pictures of any size: "c50", "as-is", "av1-36-by-8"."""
+    if run.video and side == "query":
+        return f"{slug(run.video)}-{run.video_quality}-by-{run.group_length}"
+    compression = _compression(run, side)
+    if compression < 0:
+        return "as-is"
+    return f"c{compression}" + (f"-{slug(run.jpeg_part)}" if run.jpeg_part else "")
 
 
 def _worsened(traverse: Traverse, run: RunRecord, side: Side) -> Traverse:
     """Return the pictures as the run saw them."""
-    from retraverse.images.worsen import Worsening, worsened
+    from retraverse.images import VideoGroups, Worsening, worsened
 
     compression = _compression(run, side)
+    video = None
+    if run.video and side == "query":
+        video = VideoGroups(cast(Any, run.video), run.video_quality, run.group_length)
     worsening = Worsening(
         resize=run.resize or None,
         resizer="opencv" if run.resizer.startswith("opencv") else "pillow",
         compression=compression if compression >= 0 else None,
         encoder=_encoder(run.encoder),
+        part=run.jpeg_part if compression >= 0 else "",
+        video=video,
     )
     return worsened(traverse, worsening)
 

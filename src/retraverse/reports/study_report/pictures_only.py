@@ -21,6 +21,10 @@ def picture_runs(records: Iterable[RunRecord]) -> tuple[RunRecord, ...]:
             run.compression_query,
             run.compression_reference,
             run.encoder,
+            run.jpeg_part,
+            run.video,
+            run.video_quality,
+            run.group_length,
             run.resize,
             run.resizer,
         )

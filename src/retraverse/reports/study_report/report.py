@@ -38,7 +38,6 @@ from retraverse.reports.study_report.words import (
     MEANINGS,
     dataset_title,
     number_columns,
-    run_title,
 )
 from retraverse.studies.expectations import check_expectations
 from retraverse.studies.light_records import (
@@ -256,7 +255,7 @@ def _write_index(
             "expectations": check_expectations(records),
             "troubles": troubles(records),
             "techniques": [],
-            **_frame(links, {}, pages, study, "index.html"),
+            **_frame(links, {"series": [], "panels": {}}, pages, study, "index.html"),
         },
     )
     return path
@@ -280,11 +279,12 @@ def _frame(
         "ramp": RAMP,
         "slug": slug,
         "mark_of": mark_of,
-        "run_title": run_title,
         "artefact_id": id,
         "data": {
             "files": links.files,
-            "panels": points,
+            "names": links.names,
+            "places": links.places,
+            **points,
             "numbers": [[name, MEANINGS.get(name, "")] for name in names],
         },
     }

@@ -9,11 +9,11 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from retraverse.reports.study_report.words import dataset_order
+from retraverse.reports.study_report.words import codec_title, compression_text, dataset_order
 from retraverse.studies.records import RunRecord
 from retraverse.studies.selection import condition_of
 
-__all__ = ["Place", "Runs", "Series", "SeriesBook", "headline_runs"]
+__all__ = ["Place", "Runs", "Series", "SeriesBook", "headline_runs", "is_whole", "place_of"]
 
 
 MOST_LINES = 16
@@ -49,11 +49,45 @@ class Place(NamedTuple):
     compression_query: int
     compression_reference: int
     resize: int
+    video_quality: int = -1
+    """Of the video codec the query is sent by, -1 = none."""
+
+    @property
+    def is_video(self) -> bool:
+        """Say whether the query is sent by a video codec."""
+        return self.video_quality >= 0
 
     @property
     def is_uniform(self) -> bool:
         """Say whether query and map are compressed alike."""
-        return self.compression_query == self.compression_reference
+        return not self.is_video and self.compression_query == self.compression_reference
+
+    @property
+    def is_mixed(self) -> bool:
+        """Say whether query and map are compressed differently, neither as video."""
+        return not (self.is_video or self.is_uniform)
+
+    @property
+    def query_text(self) -> str:
+        """Return what was done to the query pictures: "50", "as is", "crf 36"."""
+        if self.is_video:
+            return f"crf {self.video_quality}"
+        return compression_text(self.compression_query)
+
+
+def place_of(record: RunRecord) -> Place:
+    """Return where on the axes a run lies."""
+    return Place(
+        record.compression_query,
+        record.compression_reference,
+        record.resize,
+        record.video_quality if record.video else -1,
+    )
+
+
+def is_whole(record: RunRecord) -> bool:
+    """Say whether a run's pictures are JPEG files or as they are: no part of JPEG, no video."""
+    return not (record.jpeg_part or record.video)
 
 
 class _Key(NamedTuple):
@@ -61,6 +95,9 @@ class _Key(NamedTuple):
     parameters: str
     matcher: str
     encoder: str
+    jpeg_part: str
+    video: str
+    group_length: int
     resizer: str
     seed: int
     length: str
@@ -93,7 +130,7 @@ class Runs:
         found: dict[tuple[Series, str, Place], list[RunRecord]] = {}
         for record, key in zip(self.records, keys, strict=True):
             series = book.get(names[key], record.technique)
-            place = Place(record.compression_query, record.compression_reference, record.resize)
+            place = place_of(record)
             found.setdefault((series, record.dataset, place), []).append(record)
             self._series_of[record.run_id] = series
         self._found = {group: _by_length(runs) for group, runs in found.items()}
@@ -123,6 +160,9 @@ class Runs:
             record.matcher,
             # Pictures as they are have no encoder: they begin the usual encoder's line.
             record.encoder or self._usual_encoder,
+            record.jpeg_part,
+            record.video,
+            record.group_length,
             record.resizer or self._usual_resizer,
             record.seed,
             "" if over_length else record.sequence_length,
@@ -168,7 +208,8 @@ def headline_runs(records: Sequence[RunRecord], *, at: Sequence[str] = ()) -> li
 
 
 def _kind(record: RunRecord) -> tuple[str, ...]:
-    return record.technique, condition_of(record).parameters, record.matcher
+    condition = condition_of(record)
+    return record.technique, condition.parameters, record.matcher, record.jpeg_part, record.video
 
 
 def _kept(lengths: set[str], at: Sequence[str]) -> set[str]:
@@ -208,6 +249,10 @@ def _names(keys: Sequence[_Key]) -> dict[_Key, str]:
         if key.matcher != "mean":
             parts.append(key.matcher)
         parts += _differing(key.parameters, [other.parameters for other in alike])
+        if key.jpeg_part:
+            parts.append(f"{key.jpeg_part} alone")
+        if key.video:
+            parts.append(f"{codec_title(key.video)} in groups of {key.group_length}")
         parts += _encoder_words(key.encoder, {other.encoder for other in keys})
         for name in ("resizer", "seed"):
             if len({getattr(other, name) for other in keys}) > 1:

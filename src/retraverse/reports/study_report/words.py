@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 
+from retraverse.datasets.driven_again import recorded_name
 from retraverse.datasets.known import known_dataset, known_datasets
 from retraverse.metrics import DEFINITIONS
 from retraverse.reports.wording import NARROW, NOTHING, count, percent, plain, ratio, seconds
@@ -10,7 +11,9 @@ from retraverse.studies.records import RunRecord
 
 __all__ = [
     "MEANINGS",
+    "codec_title",
     "compression_text",
+    "damage_text",
     "dataset_order",
     "dataset_title",
     "length_words",
@@ -18,10 +21,12 @@ __all__ = [
     "measured_on",
     "number_columns",
     "place_text",
-    "run_title",
+    "run_name",
     "size_text",
     "tolerance_text",
 ]
+
+_CODECS: Mapping[str, str] = {"h265": "H.265", "av1": "AV1"}
 
 MEANINGS: Mapping[str, str] = {
     "accuracy": DEFINITIONS["accuracy"],
@@ -33,6 +38,8 @@ MEANINGS: Mapping[str, str] = {
     "K": "Sequence length: query frames that are matched together. A dynamic K is chosen for each "
     "window; its mean is given.",
     "c": "JPEG compression in per cent: quality 100 − c. “as is” means the pictures' own files.",
+    "change": "Accuracy minus that of clean pictures with the same dataset, technique and K, in "
+    "percentage points.",
     "boost": "100 (a_K − a_1) / a_1: how much better than single frames; undefined where a_1 = 0.",
     "smallest K": "The first K at which every window is answered correctly, and the K from which "
     "on that stays so. Windows: query windows left at that K. Candidates: map windows each of them "
@@ -45,6 +52,8 @@ MEANINGS: Mapping[str, str] = {
     "d": "Data of one answer: mean bytes of a query picture × K.",
     "window bytes": "Mean bytes of a query picture × K: what a robot sends for one answer; the "
     "map's own pictures are not counted.",
+    "group bytes": "Mean bytes of a query picture × K; a picture of a video weighs its group's "
+    "bytes / the group's pictures.",
     "time of a frame": "t_e + t_m: describing a new picture and matching the window that ends with "
     "it, when the descriptors of the frames before are kept.",
     "windows": "Query windows that were answered: Q − K + 1 for a fixed K.",
@@ -59,6 +68,11 @@ MEANINGS: Mapping[str, str] = {
     "descriptor size": "Bytes of one picture's descriptor.",
     "without keypoints": "Share of the query pictures in which the technique found nothing to "
     "describe.",
+    "without tables": "Mean bytes of a query picture without what all JPEG files of one encoder "
+    "and c have in common: the receiver puts these tables back, and decodes the very same picture.",
+    "legible height": "Smallest height of a number plate's characters that a reader who knows all "
+    "but the character reads nine times in ten, in made-up scenes worsened like the pictures, as a "
+    "share of the picture's side. Measured up to a quarter of the side.",
     "images": "Mean over the datasets, each weighted by its number of query pictures.",
 }
 """Name of a number -> what it is."""
@@ -72,13 +86,15 @@ def meanings(*names: str) -> tuple[tuple[str, str], ...]:
 def dataset_order(name: str) -> tuple[int, str]:
     """Return what datasets are sorted by: those known by name first, in their own order."""
     names = [known.name for known in known_datasets()]
-    return (names.index(name) if name in names else len(names), name)
+    recorded = recorded_name(name)[0]
+    return (names.index(recorded) if recorded in names else len(names), name)
 
 
 def dataset_title(name: str) -> str:
     """Return a dataset's name as people write it."""
-    known = known_dataset(name)
-    return name if known is None else known.title
+    recorded = recorded_name(name)[0]
+    known = known_dataset(recorded)
+    return name if known is None else known.title + name.removeprefix(recorded)
 
 
 def tolerance_text(record: RunRecord) -> str:
@@ -101,14 +117,34 @@ def compression_text(compression: int) -> str:
     return "as is" if compression < 0 else str(compression)
 
 
+def damage_text(record: RunRecord) -> str:
+    """Return what was done beside whole JPEG files: "H.265 crf 36, groups of 8", "means alone"."""
+    if record.video:
+        return f"{codec_title(record.video)} crf {record.video_quality}, {_groups(record)}"
+    return f"{record.jpeg_part} alone" if record.jpeg_part else ""
+
+
+def codec_title(codec: str) -> str:
+    """Return a video codec's name as people write it."""
+    return _CODECS.get(codec, codec)
+
+
+def _groups(record: RunRecord) -> str:
+    return f"groups of {record.group_length}"
+
+
 def place_text(record: RunRecord) -> str:
     """Return what was done to the pictures: "c = 50, 256 px"."""
     query, reference = record.compression_query, record.compression_reference
-    parts = []
-    if query == reference and query >= 0:
+    damage, parts = damage_text(record), []
+    if record.video:
+        parts.append(f"query as {damage}, map {'as is' if reference < 0 else f'c = {reference}'}")
+    elif query == reference and query >= 0:
         parts.append(f"c = {query}")
     elif query != reference:
         parts.append(f"c = {compression_text(query)} query, {compression_text(reference)} map")
+    if record.jpeg_part:
+        parts.append(damage)
     if record.resize:
         parts.append(f"{record.resize} px")
     return ", ".join(parts) or "pictures as they are"
@@ -121,13 +157,10 @@ def length_words(record: RunRecord) -> str:
     return f"{record.sequence_length} K, mean {plain(record.mean_sequence_length)}"
 
 
-def run_title(record: RunRecord) -> str:
-    """Return a run in one line."""
+def run_name(record: RunRecord) -> str:
+    """Return what was run on what: "hog, dtw on Corridor"."""
     matcher = "" if record.matcher == "mean" else f", {record.matcher}"
-    return (
-        f"{record.technique}{matcher} on {dataset_title(record.dataset)}, {length_words(record)}, "
-        f"{place_text(record)}"
-    )
+    return f"{record.technique}{matcher} on {dataset_title(record.dataset)}"
 
 
 def size_text(n_bytes: float) -> str:
@@ -153,7 +186,9 @@ def number_columns(record: RunRecord, data: float) -> list[tuple[str, str]]:
         ("windows", f"{record.n_windows:,}"),
         ("candidates", f"{record.n_candidates:,}"),
         ("query picture", size_text(record.query_bytes_mean)),
+        ("without tables", size_text(record.query_bare_bytes_mean)),
         ("d", size_text(data)),
+        ("legible height", percent(record.legible_height)),
         ("descriptor size", size_text(record.descriptor_bytes)),
         ("t_e", seconds(record.encode_s)),
         ("t_m", seconds(record.match_s)),

@@ -8,19 +8,24 @@
     const [a, b, v] = log ? [range[0], range[1], value].map(Math.log10) : [...range, value];
     return (v - a) / (b - a);
   };
+  const at = (list, i) => (Array.isArray(list) ? list[i] : list);
+  // What all lines have in common a panel says once: see page_points.py.
   const pointsOf = (panel, span) =>
-    panel.lines.flatMap((line, at) =>
-      line.px.map((x, i) => ({
-        line: at,
-        name: line.n,
-        technique: line.t,
-        x,
-        y: line.py[i],
-        left: span.left + span.width * fraction(span.x, x, panel.log[0]),
-        top: span.top + span.height * fraction(span.y, line.py[i], panel.log[1]),
-        file: Array.isArray(line.f) ? line.f[i] : line.f,
-        length: Array.isArray(line.k) ? line.k[i] : line.k,
-      })));
+    panel.lines.flatMap((line, number) =>
+      line.py.map((y, i) => {
+        const x = (line.px || panel.px)[i];
+        return {
+          line: number,
+          name: data.series[line.s][0],
+          technique: data.series[line.s][1],
+          x,
+          y,
+          left: span.left + span.width * fraction(span.x, x, panel.log[0]),
+          top: span.top + span.height * fraction(span.y, y, panel.log[1]),
+          file: at(line.f, i),
+          length: "k" in line ? at(line.k, i) : String(x),
+        };
+      }));
   const worded = (label, text) => {
     const [name, unit] = label.split(", ");
     return `${name ? name + " " : ""}${text}${unit === "%" ? " %" : unit ? " " + unit : ""}`;

@@ -244,7 +244,7 @@
     slot("title").textContent = "Loading the run …";
     if (!dialog.open) dialog.showModal();
     slot("title").focus();
-    load(data.files[file], (value) => {
+    load(data.files[file][0], (value) => {
       group = value;
       slot("title").textContent = group.title;
       fillLengths(length);
@@ -266,6 +266,16 @@
     const cut = link.indexOf("/");
     widgets.openRun(Number(link.slice(0, cut)), link.slice(cut + 1));
   };
+  const lengthWords = (length) => (/^\d+$/.test(length) ? `K = ${length}` : `${length} K`);
+  const sayWhatOpens = (event) => {
+    const button = event.target.closest?.("[data-run]");
+    if (!button || button.title) return;
+    const cut = button.dataset.run.indexOf("/");
+    const [, name, place] = data.files[Number(button.dataset.run.slice(0, cut))];
+    const length = lengthWords(button.dataset.run.slice(cut + 1));
+    button.title = `Open the run: ${data.names[name]}, ${length}, ${data.places[place]}`;
+  };
+  for (const event of ["pointerover", "focusin"]) document.addEventListener(event, sayWhatOpens);
   for (const button of all(".match-case .open-run")) {
     button.addEventListener("click", () => openLink(button.dataset.run));
   }

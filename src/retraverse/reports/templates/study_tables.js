@@ -2,7 +2,11 @@
 (() => {
   const { one, all } = widgets;
 
-  const keyOf = (row, column) => row.children[column]?.dataset.v ?? "";
+  // A cell that says nothing else sorts by its text.
+  const keyOf = (row, column) => {
+    const cell = row.children[column];
+    return cell ? cell.dataset.v ?? cell.textContent : "";
+  };
   const compare = (a, b) => {
     if (a === "" || b === "") return a === b ? 0 : a === "" ? 1 : -1;
     const [x, y] = [Number(a), Number(b)];

@@ -147,8 +147,9 @@ class RegionalHog:
     def warn_of_empty_roi(self, n_empty: int, n_pictures: int) -> None:
         """Say in a warning how many pictures have no region of interest, and what is done."""
         logger.warning(
-            "%d of %d pictures have no region with entropy >= roi_entropy %.3g; "
+            "%s: %d of %d pictures have no region with entropy >= roi_entropy %.3g; "
             "all their regions are matched instead (dark or flat pictures? lower roi_entropy)",
+            self.name,
             n_empty,
             n_pictures,
             self.parameters.roi_entropy,

@@ -62,8 +62,8 @@ def test_no_region_of_interest_takes_all_and_warns_once(caplog: pytest.LogCaptur
         technique.region_weights(flat)
     np.testing.assert_allclose(weights, 1 / 961, rtol=1e-5)
     assert [record.message for record in caplog.records] == [
-        "1 of 1 pictures have no region with entropy >= roi_entropy 0.79; all their regions are "
-        "matched instead (dark or flat pictures? lower roi_entropy)"
+        "cohog: 1 of 1 pictures have no region with entropy >= roi_entropy 0.79; all their "
+        "regions are matched instead (dark or flat pictures? lower roi_entropy)"
     ]
 
 

@@ -20,7 +20,7 @@ from retraverse.reports.study_report.figures import (
     weighted_means,
 )
 from retraverse.reports.study_report.pictures_only import picture_runs
-from retraverse.reports.study_report.series import Place, Runs
+from retraverse.reports.study_report.series import Place, Runs, is_whole, place_of
 from retraverse.reports.study_report.words import (
     compression_text,
     dataset_order,
@@ -148,14 +148,15 @@ def dataset_sizes(given: ChapterInput, *, number: str, over: str) -> Table:
 
 
 def _compression(run: RunRecord) -> int | None:
-    if run.compression_query != run.compression_reference:
-        return None
-    return run.compression_query
+    return run.compression_query if _is_compressed_alike(run) else None
 
 
 def _size(run: RunRecord) -> int | None:
-    is_uniform = run.compression_query == run.compression_reference
-    return run.resize if is_uniform else None
+    return run.resize if _is_compressed_alike(run) else None
+
+
+def _is_compressed_alike(run: RunRecord) -> bool:
+    return is_whole(run) and place_of(run).is_uniform
 
 
 def _size_name(size: int) -> str:
@@ -188,7 +189,7 @@ def non_uniform_figures(runs: Runs, numbers: tuple[str, str]) -> Iterable[Artefa
         ("map", "query", lambda p: p.compression_reference, lambda p: p.compression_query),
     )
     for number, (varied, fixed, of_varied, of_fixed) in zip(numbers, sides, strict=True):
-        mixed = [place for place in runs.places if not place.is_uniform]
+        mixed = [place for place in runs.places if place.is_mixed]
         if not mixed:
             continue
         base = min(of_fixed(place) for place in mixed)

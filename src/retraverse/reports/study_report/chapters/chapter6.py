@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 
 from retraverse.reports.study_report.artefacts import Artefact, Cell, Chapter, Section, Table
+from retraverse.reports.study_report.chapters.bare_sizes import bare_table
 from retraverse.reports.study_report.chapters.chapter4 import encoding_table
 from retraverse.reports.study_report.chapters.context import ChapterInput, long_table
 from retraverse.reports.study_report.chapters.data_of_answers import (
@@ -79,6 +80,7 @@ def _sizes(given: ChapterInput, runs: Runs, pictures: Runs) -> tuple[Artefact, .
             is_log=True,
         ),
         _descriptor_table(given, runs),
+        bare_table(given.records),
     )
 
 

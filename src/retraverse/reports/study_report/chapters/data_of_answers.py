@@ -1,7 +1,7 @@
 """Chapter 6, what an answer weighs: the smallest K with 100 %, and accuracy for its bytes."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from retraverse.reports.study_report.artefacts import Artefact, Cell, Table
 from retraverse.reports.study_report.chapters.context import (
@@ -15,7 +15,7 @@ from retraverse.reports.study_report.words import compression_text, meanings, si
 from retraverse.studies.records import RunRecord
 from retraverse.studies.selection import data_per_answer, length_of, smallest_length
 
-__all__ = ["data_figure", "first_full", "smallest_data_table"]
+__all__ = ["data_figure", "first_full", "frontier", "smallest_data_table"]
 
 
 def first_full(runs: Sequence[RunRecord]) -> RunRecord | None:
@@ -44,8 +44,11 @@ def smallest_data_table(given: ChapterInput, runs: Runs) -> Table:
                         series,
                         first or best,
                         (
-                            _c_cell(place.compression_query),
-                            _c_cell(place.compression_reference),
+                            Cell(place.query_text, float(place.compression_query)),
+                            Cell(
+                                compression_text(place.compression_reference),
+                                float(place.compression_reference),
+                            ),
                             Cell(
                                 first.sequence_length if first else "none",
                                 float(first.sequence_length) if first else math.inf,
@@ -77,23 +80,24 @@ def smallest_data_table(given: ChapterInput, runs: Runs) -> Table:
     )
 
 
-def _c_cell(compression: int) -> Cell:
-    return Cell(compression_text(compression), float(compression))
-
-
 def data_figure(runs: Runs) -> Artefact:
     """Return accuracy over the bytes of an answer: what a robot gets for what it sends."""
 
     def points(series: Series, dataset: str) -> list[tuple[float, float, RunRecord]]:
         found = []
         for place in runs.places_of(series, dataset):
-            if place.is_uniform:
-                fixed = [run for run in runs.at(series, dataset, place) if length_of(run)]
+            if not place.is_mixed:
+                # One part of JPEG is nothing that could be sent.
+                fixed = [
+                    run
+                    for run in runs.at(series, dataset, place)
+                    if length_of(run) and not run.jpeg_part
+                ]
                 step = max(1, len(fixed) // 10)
                 found += [
                     (data_per_answer(run) / 1000, 100 * run.accuracy, run) for run in fixed[::step]
                 ]
-        return _frontier(found)
+        return frontier(found)
 
     return scattered(
         runs,
@@ -111,10 +115,10 @@ def data_figure(runs: Runs) -> Artefact:
     )
 
 
-def _frontier(
-    points: Sequence[tuple[float, float, RunRecord]],
+def frontier(
+    points: Iterable[tuple[float, float, RunRecord]],
 ) -> list[tuple[float, float, RunRecord]]:
-    """Return the points that none with a smaller x is as high as, left to right."""
+    """Return the points (x, y, run) that none with a smaller x is as high as, left to right."""
     kept: list[tuple[float, float, RunRecord]] = []
     finite = [point for point in points if math.isfinite(point[0])]
     for point in sorted(finite, key=lambda point: (point[0], -point[1])):

@@ -12,11 +12,6 @@ from retraverse.reports.study_report.chapters.context import (
     seconds_cell,
 )
 from retraverse.reports.study_report.chapters.data_of_answers import data_figure
-from retraverse.reports.study_report.chapters.matchers import (
-    has_matchers,
-    matcher_means,
-    matcher_tables,
-)
 from retraverse.reports.study_report.figures import (
     PERCENT,
     accuracy_percent,
@@ -34,30 +29,10 @@ from retraverse.reports.study_report.words import (
 )
 from retraverse.studies.selection import data_per_answer, length_of
 
-__all__ = ["beyond", "free_plan"]
+__all__ = ["free_plan", "free_sections"]
 
 _MOST_ROWS = 1500
 """Runs that the table of all runs shows at most; the exported one has them all."""
-
-
-def beyond(given: ChapterInput) -> Chapter:
-    """Return the page of what the thesis names as future work."""
-    return Chapter(
-        "beyond",
-        "Beyond the thesis",
-        "Which way of matching a sequence bears compression best, and what does it cost? The "
-        "thesis names this as future work.",
-        _matcher_sections(given) if has_matchers(given.records) else _sections(given),
-        given.records,
-    )
-
-
-def _matcher_sections(given: ChapterInput) -> tuple[Section, ...]:
-    """Return the sections of a page whose axis is the matcher."""
-    return (
-        Section("Which matcher bears compression?", matcher_means(given)),
-        Section("Every technique with every matcher", matcher_tables(given)),
-    )
 
 
 def free_plan(given: ChapterInput) -> Chapter:
@@ -67,12 +42,13 @@ def free_plan(given: ChapterInput) -> Chapter:
         "The runs of this plan",
         "Which technique, picture quality, size and sequence length are accurate, small and fast "
         "enough?",
-        _sections(given),
+        free_sections(given),
         given.records,
     )
 
 
-def _sections(given: ChapterInput) -> tuple[Section, ...]:
+def free_sections(given: ChapterInput) -> tuple[Section, ...]:
+    """Return sections along whatever axes the records have."""
     over, headlines = given.over_length, given.headlines()
     lengths = {length_of(run) for run in over.records} - {None}
     quality: list[Artefact] = []
@@ -154,7 +130,7 @@ def _all_runs(given: ChapterInput, headlines: Runs) -> Table:
                     data = data_per_answer(run)
                     cells = (
                         Cell(length_words(run), run.mean_sequence_length),
-                        Cell(compression_text(run.compression_query), run.compression_query),
+                        Cell(place.query_text, run.compression_query),
                         Cell(
                             compression_text(run.compression_reference), run.compression_reference
                         ),

@@ -62,7 +62,7 @@ def _pick(runs: Runs, series: Series, dataset: str, place: Place) -> Pick:
         (
             min(other.compression_query, other.compression_reference)
             for other in runs.places
-            if not other.is_uniform
+            if other.is_mixed
         ),
         default=0,
     )

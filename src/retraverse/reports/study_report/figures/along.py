@@ -80,15 +80,22 @@ def over_compression(
     is_log: bool = False,
     with_interval: bool = False,
 ) -> Figure:
-    """Return a value over c, a panel for each dataset, a step for each c of the study."""
-    steps = sorted({compression(place) for place in runs.places if where(place)})
+    """Return a value over c, a panel for each dataset, a step for each c of the study.
+
+    What is sent as video has no c and is not shown.
+    """
+
+    def is_shown(place: Place) -> bool:
+        return where(place) and not place.is_video
+
+    steps = sorted({compression(place) for place in runs.places if is_shown(place)})
 
     def line(series: Series, dataset: str) -> Line | None:
         size = max((place.resize for place in runs.places_of(series, dataset)), default=0)
         places = [
             place
             for place in runs.places_of(series, dataset)
-            if where(place) and place.resize == size
+            if is_shown(place) and place.resize == size
         ]
         picked = [
             (float(steps.index(compression(place))), run)

@@ -41,6 +41,7 @@ def plainest(places: Sequence[Place]) -> Place | None:
         places,
         key=lambda place: (
             max(place.compression_query, 0) + max(place.compression_reference, 0),
+            max(place.video_quality, 0),
             0 if place.resize == 0 else 1 / place.resize,
         ),
         default=None,

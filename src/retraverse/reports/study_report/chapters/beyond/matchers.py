@@ -5,12 +5,13 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from retraverse.reports.study_report.artefacts import Artefact, Cell, Figure, Line, Row, Table
-from retraverse.reports.study_report.chapters.context import ChapterInput, seconds_cell
+from retraverse.reports.study_report.chapters.context import seconds_cell
 from retraverse.reports.study_report.figures import PERCENT
 from retraverse.reports.study_report.panels import draw_lines
 from retraverse.reports.study_report.series import Runs, Series, SeriesBook
 from retraverse.reports.study_report.words import (
     compression_text,
+    dataset_order,
     dataset_title,
     meanings,
     measured_on,
@@ -18,16 +19,7 @@ from retraverse.reports.study_report.words import (
 from retraverse.reports.wording import NOTHING, percent
 from retraverse.studies.records import RunRecord
 
-__all__ = ["has_matchers", "matcher_means", "matcher_tables"]
-
-
-def has_matchers(records: Iterable[RunRecord]) -> bool:
-    """Say whether some technique was matched in more than one way."""
-    found: dict[tuple[str, str], set[str]] = {}
-    for run in records:
-        if run.status == "ok":
-            found.setdefault((run.dataset, run.technique), set()).add(run.matcher)
-    return any(len(matchers) > 1 for matchers in found.values())
+__all__ = ["matcher_means", "matcher_tables"]
 
 
 @dataclass(frozen=True)
@@ -40,17 +32,12 @@ class _Entry:
     by_step: dict[int, RunRecord]
 
 
-def _entries(given: ChapterInput, dataset: str) -> list[_Entry]:
-    """Return the rows of a dataset, pictures of query and map compressed alike."""
-    uniform = [
-        run
-        for run in given.records
-        if run.status == "ok" and run.compression_query == run.compression_reference
-    ]
+def _entries(runs: Sequence[RunRecord], dataset: str) -> list[_Entry]:
+    """Return the rows of a dataset."""
     # Named as if all had one matcher: the matcher has a column of its own.
-    named = Runs([replace(run, matcher="mean") for run in uniform], SeriesBook({}))
+    named = Runs([replace(run, matcher="mean") for run in runs], SeriesBook({}))
     found: dict[tuple[Series, str, str], dict[int, RunRecord]] = {}
-    for run in uniform:
+    for run in runs:
         if run.dataset == dataset:
             key = (named.series_of(run), run.matcher, run.sequence_length)
             found.setdefault(key, {})[run.compression_query] = run
@@ -65,16 +52,25 @@ def _highest(values: Iterable[float]) -> float:
     return max((value for value in values if math.isfinite(value)), default=math.nan)
 
 
-def matcher_tables(given: ChapterInput) -> tuple[Table, ...]:
+def matcher_tables(runs: Sequence[RunRecord]) -> tuple[Table, ...]:
     """Return, for each dataset, the accuracy of every technique and matcher at every c.
 
     The best of each column is marked; with it stand the 95 % intervals.
+
+    Parameters
+    ----------
+    runs : sequence of RunRecord
+        As `chosen.compared_matchers` returns them.
     """
-    return tuple(_table(given, dataset) for dataset in given.over_length.datasets)
+    return tuple(_table(runs, dataset) for dataset in _datasets(runs))
 
 
-def _table(given: ChapterInput, dataset: str) -> Table:
-    entries = _entries(given, dataset)
+def _datasets(runs: Iterable[RunRecord]) -> list[str]:
+    return sorted({run.dataset for run in runs}, key=dataset_order)
+
+
+def _table(runs: Sequence[RunRecord], dataset: str) -> Table:
+    entries = _entries(runs, dataset)
     steps = _steps(entries)
     best = {
         step: _highest(entry.by_step[step].accuracy for entry in entries if step in entry.by_step)
@@ -129,17 +125,17 @@ def _accuracy_cell(run: RunRecord | None, best: float) -> Cell:
     )
 
 
-def matcher_means(given: ChapterInput) -> tuple[Artefact, ...]:
+def matcher_means(runs: Sequence[RunRecord]) -> tuple[Artefact, ...]:
     """Return the mean over the techniques, for each matcher: a table and a figure.
 
     Only matchers that met all techniques at all c of a dataset are in it, so that all means are
     over the same pictures and techniques.
     """
-    groups = {dataset: _means(_entries(given, dataset)) for dataset in given.over_length.datasets}
+    groups = {dataset: _means(_entries(runs, dataset)) for dataset in _datasets(runs)}
     shown = {dataset: means for dataset, means in groups.items() if len(means) > 1}
     if not shown:
         return ()
-    return (_means_table(shown), _means_figure(given, shown))
+    return (_means_table(shown), _means_figure(runs, shown))
 
 
 @dataclass(frozen=True)
@@ -206,11 +202,11 @@ def _means_table(groups: dict[str, list[_Mean]]) -> Table:
     )
 
 
-def _means_figure(given: ChapterInput, groups: dict[str, list[_Mean]]) -> Figure:
+def _means_figure(runs: Sequence[RunRecord], groups: dict[str, list[_Mean]]) -> Figure:
     panels, book = [], SeriesBook({})
     for dataset, means in groups.items():
         steps = sorted(means[0].accuracy)
-        sample = next(run for run in given.records if run.dataset == dataset)
+        sample = next(run for run in runs if run.dataset == dataset)
         lines = [
             Line(
                 book.get(mean.matcher, ""),

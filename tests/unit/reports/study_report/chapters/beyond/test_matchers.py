@@ -9,7 +9,7 @@ from tests.unit.reports.study_report.made_up import make_run, write_study
 from tests.unit.reports.test_comparison_report import Page
 
 from retraverse.reports import write_study_report
-from retraverse.reports.study_report.chapters.matchers import has_matchers
+from retraverse.reports.study_report.chapters.beyond.chosen import compared_matchers
 from retraverse.studies.records import RunRecord
 
 ACCURACY = {
@@ -67,16 +67,44 @@ def test_means_are_over_the_techniques(report: Path) -> None:
 
 
 def test_a_matcher_that_missed_a_technique_has_no_mean(tmp_path: Path) -> None:
-    write_study(tmp_path, [run for run in made_runs()
-                           if (run.technique, run.matcher) != ("hog", "mean")])  # fmt: skip
+    third = [
+        make_run(technique=run.technique, length="10", chapter="beyond", accuracy=0.5,
+                 compression=(run.compression_query,) * 2, matcher="hmm")
+        for run in made_runs()
+    ]  # fmt: skip
+    kept = [run for run in made_runs() if (run.technique, run.matcher) != ("hog", "mean")]
+    write_study(tmp_path, [*kept, *third])
     out = write_study_report(tmp_path, tmp_path / "out").parent
-    # One matcher alone is compared with nothing.
-    assert not list((out / "exports/beyond").glob("matchers-under-*"))
-    assert list((out / "exports/beyond").glob("corridor-every-matcher*.csv"))
+    rows = exported(out, "matchers-under-compression-mean-of-the-techniques.csv")
+    assert sorted(row["Matcher"] for row in rows) == ["dtw", "hmm"]
+    table = next((out / "exports/beyond").glob("corridor-every-matcher*.csv")).read_text()
+    assert "cohog,mean" in table
 
 
 def test_one_matcher_is_no_comparison() -> None:
     runs = made_runs()
-    assert has_matchers(runs)
-    assert not has_matchers(run for run in runs if run.matcher == "mean")
-    assert not has_matchers([])
+    assert len(compared_matchers(runs)) == len(runs)
+    assert compared_matchers(run for run in runs if run.matcher == "mean") == []
+    assert compared_matchers([]) == []
+
+
+def test_what_only_one_matcher_was_tried_on_is_left_out() -> None:
+    # A plan without other matchers has more c and techniques, and belongs elsewhere.
+    others = [
+        make_run(technique=technique, length="10", compression=(c, c), chapter="beyond")
+        for technique in ("hog", "orb")
+        for c in (-1, 50)
+    ]
+    part = make_run(length="10", compression=(99, 99), jpeg_part="grid", matcher="dtw")
+    runs = [*others, part, *made_runs()]
+    assert {run.run_id for run in compared_matchers(runs)} == {run.run_id for run in made_runs()}
+
+
+def test_the_largest_pictures_stand_for_all() -> None:
+    small = [
+        make_run(length="10", compression=(c, c), resize=64, matcher=matcher)
+        for c in STEPS
+        for matcher in ("mean", "dtw")
+    ]
+    assert {run.resize for run in compared_matchers([*small, *made_runs()])} == {0}
+    assert len(compared_matchers(small)) == len(small)
