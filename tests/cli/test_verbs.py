@@ -120,6 +120,21 @@ def test_map_localize_evaluate(run: Run, drives: tuple[Path, Path], tmp_path: Pa
     assert json.loads(extended.stdout)["n_frames"] == 48
 
 
+def test_workers_build_and_extend_the_same_map(run: Run, drives: tuple[Path, Path]) -> None:
+    contents = []
+    for out, words in (("alone.map", ()), ("many.map", ("--workers", 1))):
+        built = run("map", "build", drives[0], "--out", out, "-t", "hog", *words, "--json")
+        assert built.returncode == 0, built.stderr
+        extended = run("map", "extend", out, drives[1], *words, "--json")
+        assert extended.returncode == 0, extended.stderr
+        contents.append(json.loads(extended.stdout)["content_sha256"])
+    assert contents[0] == contents[1]
+    words = ("--out", "third.map", "--workers", 1, "--cluster", "local:1")
+    both = run("map", "build", drives[0], *words)
+    assert both.returncode == 2
+    assert "got workers and a cluster" in both.stderr
+
+
 def test_localize_dynamic(run: Run, drives: tuple[Path, Path], tmp_path: Path) -> None:
     run("map", "build", drives[0], "--out", "route.map", "--set", "precision=int8")
     done = run("localize", "route.map", drives[1], "-k", "dynamic", "--threshold", 0.0)

@@ -20,6 +20,7 @@ from retraverse.cli.options import (
 )
 from retraverse.cli.output import print_json, print_table, progress
 from retraverse.maps import RouteMap, build_map, load_map
+from retraverse.studies.map_workers import describing_by
 
 __all__ = ["app"]
 
@@ -29,6 +30,16 @@ MapPath = Annotated[Path, typer.Argument(help="A route map: a folder made by `ma
 Source = Annotated[str, typer.Argument(help="The drive: folder, glob or video.")]
 Positions = Annotated[
     Path | None, typer.Option("--positions", help="CSV with a position in metres per frame.")
+]
+
+
+Workers = Annotated[
+    int | None,
+    typer.Option("--workers", min=1, help="Processes that describe, for long drives."),
+]
+Cluster = Annotated[
+    str | None,
+    typer.Option("--cluster", help="Dask: tcp://HOST:PORT, tls://HOST:PORT, or local:WORKERS."),
 ]
 
 
@@ -49,21 +60,25 @@ def build(
     every: Every = 1,
     skip_bad: SkipBad = False,
     min_motion: MinMotion = 0.0,
+    workers: Workers = None,
+    cluster: Cluster = None,
     json_output: JsonOutput = False,
 ) -> None:
     """Describe a drive and write it as a route map."""
     traverse = open_drive(
         source, every=every, skip_bad=skip_bad, min_motion=min_motion, progress=progress()
     )
-    route = build_map(
-        traverse,
-        make_technique(technique, settings, resolution, runtime),
-        path=out,
-        thumbnails=thumbnails,
-        positions=None if positions is None else positions_of(traverse, positions),
-        overwrite=overwrite,
-        progress=progress(),
-    )
+    with describing_by(workers, cluster) as describer:
+        route = build_map(
+            traverse,
+            make_technique(technique, settings, resolution, runtime),
+            path=out,
+            thumbnails=thumbnails,
+            positions=None if positions is None else positions_of(traverse, positions),
+            overwrite=overwrite,
+            describer=describer,
+            progress=progress(),
+        )
     _print_info(route, json_output)
 
 
@@ -81,6 +96,8 @@ def extend(
     every: Every = 1,
     skip_bad: SkipBad = False,
     min_motion: MinMotion = 0.0,
+    workers: Workers = None,
+    cluster: Cluster = None,
     json_output: JsonOutput = False,
 ) -> None:
     """Add the frames of a further drive to the end of a map."""
@@ -88,11 +105,13 @@ def extend(
     traverse = open_drive(
         source, every=every, skip_bad=skip_bad, min_motion=min_motion, progress=progress()
     )
-    route.extend(
-        traverse,
-        positions=None if positions is None else positions_of(traverse, positions),
-        progress=progress(),
-    )
+    with describing_by(workers, cluster) as describer:
+        route.extend(
+            traverse,
+            positions=None if positions is None else positions_of(traverse, positions),
+            describer=describer,
+            progress=progress(),
+        )
     _print_info(route, json_output)
 
 

@@ -4,6 +4,7 @@ import os
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from retraverse.maps.contents import (
@@ -13,7 +14,7 @@ from retraverse.maps.contents import (
     read_back,
     write_contents,
 )
-from retraverse.maps.describe import Frames, count_frames
+from retraverse.maps.describe import Describer, Frames, count_frames, describe_frames
 from retraverse.maps.frame_table import read_positions
 from retraverse.maps.route_map import RouteMap
 from retraverse.maps.segment import gather
@@ -34,6 +35,7 @@ def build_map(
     thumbnails: int | None = None,
     overwrite: bool = False,
     threads: int | None = None,
+    describer: Describer | None = None,
     progress: Progress = no_progress,
 ) -> RouteMap:
     """Describe a reference traverse and return its map.
@@ -56,6 +58,8 @@ def build_map(
     threads : int >= 1, optional
         How many frames are described at once; default: the cores this process may use. The
         map does not depend on it.
+    describer : Describer, optional
+        Who describes the frames in place of threads, such as worker processes.
     progress : Progress
         Watches the frames.
 
@@ -81,7 +85,12 @@ def build_map(
         manifest=None,
     )
     described = describe_positioned(
-        reference, technique, metres, contents.thumbnails, threads, progress
+        reference,
+        technique,
+        metres,
+        contents.thumbnails,
+        describer or partial(describe_frames, threads=threads),
+        progress,
     )
     with closing(described):
         segments = gather(described, technique.layout)

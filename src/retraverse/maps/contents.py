@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 
 from retraverse.errors import InputError
-from retraverse.maps.describe import DescribedFrame, Frames, describe_frames
+from retraverse.maps.describe import DescribedFrame, Describer, Frames
 from retraverse.maps.frame_table import FrameTable
 from retraverse.maps.manifest import Manifest, SegmentFile
 from retraverse.maps.provenance import Step, TechniqueRecord
@@ -97,14 +97,12 @@ def describe_positioned(
     technique: Technique,
     metres: Array | None,
     thumbnails: ThumbnailSpec | None,
-    threads: int | None,
+    describer: Describer,
     progress: Progress,
 ) -> Generator[DescribedFrame, None, None]:
     """Yield the described frames, with their positions."""
     with closing(
-        describe_frames(
-            frames, technique, thumbnails=thumbnails, threads=threads, progress=progress
-        )
+        describer(frames, technique, thumbnails=thumbnails, progress=progress)
     ) as described:
         for row, frame in enumerate(described):
             if metres is not None:

@@ -24,8 +24,10 @@ from retraverse.types import Progress, no_progress
 
 __all__ = [
     "DescribedFrame",
+    "Describer",
     "Frames",
     "available_cores",
+    "count_frames",
     "describe_frames",
     "describe_traverse",
     "in_order",
@@ -60,6 +62,21 @@ class DescribedFrame:
     describe_s: float
     """Seconds that describing it took (t_e), with the other threads running beside it; in a
     batch, its share."""
+
+
+class Describer(Protocol):
+    """Describes the frames of a map, on threads of this process or elsewhere."""
+
+    def __call__(
+        self,
+        frames: Frames,
+        technique: Technique,
+        *,
+        thumbnails: ThumbnailSpec | None = None,
+        progress: Progress = no_progress,
+    ) -> Generator[DescribedFrame, None, None]:
+        """Yield every frame described, in order; see `describe_frames`."""
+        ...
 
 
 def describe_traverse(

@@ -10,6 +10,7 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from retraverse.maps.contents import (
     read_back,
     write_contents,
 )
-from retraverse.maps.describe import Frames, count_frames
+from retraverse.maps.describe import Describer, Frames, count_frames, describe_frames
 from retraverse.maps.frame_table import FrameTable, read_positions
 from retraverse.maps.manifest import FORMAT_VERSION
 from retraverse.maps.provenance import Provenance
@@ -206,6 +207,7 @@ class RouteMap:
         *,
         positions: Array | Sequence[object] | None = None,
         threads: int | None = None,
+        describer: Describer | None = None,
         progress: Progress = no_progress,
     ) -> "RouteMap":
         """Add frames to the end of the route and return this map, grown.
@@ -220,6 +222,8 @@ class RouteMap:
             Metres; needed if, and only if, the map has positions, with as many columns.
         threads : int >= 1, optional
             How many frames are described at once; default: the cores this process may use.
+        describer : Describer, optional
+            Who describes the frames in place of threads, such as worker processes.
         progress : Progress
 
         Raises
@@ -238,7 +242,12 @@ class RouteMap:
         kept, last = split_small_end(contents.segments)
         grown = replace(contents, history=(*contents.history, new_step("extend", frames)))
         described = describe_positioned(
-            frames, self._technique, metres, contents.thumbnails, threads, progress
+            frames,
+            self._technique,
+            metres,
+            contents.thumbnails,
+            describer or partial(describe_frames, threads=threads),
+            progress,
         )
         with closing(described):
             fresh = gather(itertools.chain(last, described), self._technique.layout)

@@ -186,7 +186,7 @@ class _Run:
                 outcome = lost_task(begun) if done.outcome is None else done.outcome
                 if isinstance(outcome, Described):
                     self._take_described(done.number, outcome)
-                else:
+                elif isinstance(outcome, Matched):
                     self._take_matched(-1 - done.number, outcome)
                 yield schedule.cost(done.number)
 

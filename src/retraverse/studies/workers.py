@@ -1,4 +1,4 @@
-"""Who runs the tasks of a study: this process, or worker processes of this machine.
+"""Who runs the tasks of a study or a map: this process, or worker processes of this machine.
 
 A task is a plain value and its outcome is one too, whoever runs it; workers read pictures and
 write nothing. Each computes on one thread. A worker that dies (out of memory, killed) costs its
@@ -19,6 +19,7 @@ from typing import Protocol
 
 from retraverse.errors import RetraverseError
 from retraverse.studies.describe_task import Described, DescribeTask, describe_task
+from retraverse.studies.frames_task import DescribedFrames, FramesTask, frames_task
 from retraverse.studies.match_task import Matched, MatchTask, failed_runs, match_task
 
 __all__ = [
@@ -36,8 +37,8 @@ __all__ = [
 
 logger = logging.getLogger(__name__)
 
-Task = DescribeTask | MatchTask
-Outcome = Described | Matched
+Task = DescribeTask | MatchTask | FramesTask
+Outcome = Described | Matched | DescribedFrames
 MOST_ATTEMPTS = 3
 """A task whose worker was lost so often is given up: it is likely to be the reason."""
 ONE_THREAD = dict.fromkeys(
@@ -81,7 +82,9 @@ class Pool(Protocol):
 
 def run_task(task: Task) -> Outcome:
     """Return the outcome of a task."""
-    return describe_task(task) if isinstance(task, DescribeTask) else match_task(task)
+    if isinstance(task, DescribeTask):
+        return describe_task(task)
+    return match_task(task) if isinstance(task, MatchTask) else frames_task(task)
 
 
 def lost_task(task: Task) -> Outcome:
@@ -89,6 +92,8 @@ def lost_task(task: Task) -> Outcome:
     reason = f"its worker was lost {MOST_ATTEMPTS} times (out of memory, or crashed?)"
     if isinstance(task, DescribeTask):
         return Described({}, {wanted.key: reason for wanted in task.wanted})
+    if isinstance(task, FramesTask):
+        return DescribedFrames(error=RetraverseError(f"{task.label}: {reason}"))
     return Matched(failed_runs(task.base, task.runs, reason), None)
 
 
