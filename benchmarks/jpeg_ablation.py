@@ -17,7 +17,7 @@ from _worse_sets import BLOCK, TECHNIQUES, picture_sets, print_head, print_row
 
 import retraverse as rt
 from retraverse.metrics import bootstrap_interval
-from retraverse.studies.jpeg_ablation import ABLATED_PARTS, AblationPoint, ablate
+from retraverse.studies.measuring.jpeg_ablation import ABLATED_PARTS, AblationPoint, ablate
 
 NAMES = ("CoHOG", "ORB", "HOG 256", "GIST 128", "patchnorm")
 LENGTHS = (1, 10)

@@ -1,11 +1,12 @@
 """Print, by resolution and compression, how large writing must be to be read, beside accuracy.
 
 Run: .venv/bin/python benchmarks/privacy.py [DATA_FOLDER]
-Legibility is a stand-in for privacy (retraverse.studies.legibility): characters drawn into made-up
-scenes, read by a reader who knows font, place and size; smallest height read to 90 %, in percent
-of the picture's side, and the distance at which the characters of a number plate (75 mm) are so
-large for a camera of 60 degrees. Nothing is said about faces. Accuracy: windows of 10, query and
-map both resized by Pillow to the square and compressed (pillow 4:2:0 optimize).
+Legibility is a stand-in for privacy (retraverse.studies.measuring.legibility): characters drawn
+into made-up scenes, read by a reader who knows font, place and size; smallest height read to 90 %,
+in percent of the picture's side, and the distance at which the characters of a number plate
+(75 mm) are so large for a camera of 60 degrees. Nothing is said about faces.
+Accuracy: windows of 10, query and map both resized by Pillow to the square and compressed (pillow
+4:2:0 optimize).
 """
 
 import numpy as np
@@ -14,7 +15,7 @@ from _worse_sets import describe, hits, print_head, print_row, share
 
 import retraverse as rt
 from retraverse.images import Encoder, Worsening, worsened
-from retraverse.studies.legibility import smallest_legible_height
+from retraverse.studies.measuring.legibility import smallest_legible_height
 from retraverse.techniques import Technique
 from retraverse.types import FloatArray
 

@@ -1,9 +1,10 @@
 """Print accuracy with quantisation tables tuned on the map alone against the standard's.
 
 Run: .venv/bin/python benchmarks/quantisation.py [DATA_FOLDER]
-Tables are tuned per technique, set and c by `retraverse.studies.quantisation` on the reference
-drive; the query is then compressed with them, scaled by one factor so that its mean bytes do not
-exceed those of the standard's tables at that c. The map is clean. Encoder: pillow 4:2:0 optimize.
+Tables are tuned per technique, set and c by `retraverse.studies.measuring.quantisation` on the
+reference drive; the query is then compressed with them, scaled by one factor so that its mean
+bytes do not exceed those of the standard's tables at that c. The map is clean.
+Encoder: pillow 4:2:0 optimize.
 Intervals: 95 %, circular block bootstrap (10 windows), paired by window.
 """
 
@@ -27,7 +28,7 @@ from _worse_sets import (
 import retraverse as rt
 from retraverse.images import Encoder, QuantisationTables, Worsening, frame_bytes, worsened
 from retraverse.images.quantisation import STANDARD_TABLES
-from retraverse.studies.quantisation import TuningPlan, fit_bytes, tune_tables
+from retraverse.studies.measuring.quantisation import TuningPlan, fit_bytes, tune_tables
 
 COMPRESSIONS = (95,)
 LENGTHS = (1, 10)

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from retraverse.studies.engine import run_study
-from retraverse.studies.plan_file import read_plan
+from retraverse.studies.plans.plan_file import read_plan
 
 GRID = """
 name = "chapter 6 with HOG"

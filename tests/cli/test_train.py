@@ -15,7 +15,7 @@ import retraverse as rt
 from retraverse.cli.main import app
 from retraverse.errors import ConfigError, DataMissingError, InputError
 from retraverse.images.quantisation import STANDARD_TABLES
-from retraverse.studies.tables_file import load_tables
+from retraverse.studies.plans.tables_file import load_tables
 
 SMALL = ("--set", "block=2", "--set", "resolution=64", "--threads", 1)
 

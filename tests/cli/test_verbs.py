@@ -129,8 +129,8 @@ def test_workers_build_and_extend_the_same_map(run: Run, drives: tuple[Path, Pat
         assert extended.returncode == 0, extended.stderr
         contents.append(json.loads(extended.stdout)["content_sha256"])
     assert contents[0] == contents[1]
-    words = ("--out", "third.map", "--workers", 1, "--cluster", "local:1")
-    both = run("map", "build", drives[0], *words)
+    kinds = ("--workers", 1, "--cluster", "local:1")
+    both = run("map", "build", drives[0], "--out", "third.map", *kinds)
     assert both.returncode == 2
     assert "got workers and a cluster" in both.stderr
 

@@ -15,9 +15,9 @@ import pytest
 from tests.unit.studies.tiny import ROOT, hashes, tiny_plan, tiny_registered, write_dataset
 
 from retraverse.errors import ConfigError, InputError, MissingExtraError
-from retraverse.studies import cluster
 from retraverse.studies.engine import run_study
-from retraverse.studies.study_folder import read_study
+from retraverse.studies.keeping.study_folder import read_study
+from retraverse.studies.tasks import cluster
 
 GUIDE = ROOT / "docs" / "cluster.md"
 

@@ -26,12 +26,12 @@ from tests.unit.studies.tiny import (
 )
 
 from retraverse.errors import InputError
-from retraverse.studies import cache as cache_module
-from retraverse.studies import workers
-from retraverse.studies.cache import StudyCache
 from retraverse.studies.engine import run_study
-from retraverse.studies.study_folder import read_study
-from retraverse.studies.work import plan_work
+from retraverse.studies.keeping import cache as cache_module
+from retraverse.studies.keeping.cache import StudyCache
+from retraverse.studies.keeping.study_folder import read_study
+from retraverse.studies.tasks import workers
+from retraverse.studies.tasks.work import plan_work
 
 
 @pytest.fixture(autouse=True)

@@ -11,7 +11,7 @@ from retraverse.cli.study import print_expectations
 
 if TYPE_CHECKING:
     from retraverse.studies.engine import StudyResult
-    from retraverse.studies.plan import StudyPlan
+    from retraverse.studies.plans.plan import StudyPlan
 
 __all__ = ["reproduce"]
 

@@ -11,7 +11,7 @@ from retraverse.cli.options import JsonOutput, ShowPictures
 from retraverse.cli.output import print_json, print_table, progress, remark
 
 if TYPE_CHECKING:
-    from retraverse.studies.records import RunRecord
+    from retraverse.studies.keeping.records import RunRecord
 
 __all__ = ["app", "check", "print_expectations", "report", "run", "show"]
 
@@ -53,7 +53,7 @@ def run(
 ) -> None:
     """Run a plan; what is done already is kept, so run it again after a break."""
     from retraverse.studies.engine import run_study
-    from retraverse.studies.plan_file import load_plan
+    from retraverse.studies.plans.plan_file import load_plan
 
     on_missing = "record" if skip_missing else "refuse"
     result = run_study(
@@ -90,7 +90,7 @@ def check(
     from retraverse.errors import InputError
     from retraverse.maps.describe import available_cores
     from retraverse.studies.estimate import estimate_study
-    from retraverse.studies.plan_file import load_plan
+    from retraverse.studies.plans.plan_file import load_plan
 
     n_workers = available_cores() if workers is None else workers
     estimate = estimate_study(
@@ -113,7 +113,7 @@ def show(
     json_output: JsonOutput = False,
 ) -> None:
     """Show what a study has found so far: one line a run."""
-    from retraverse.studies.study_folder import read_study
+    from retraverse.studies.keeping.study_folder import read_study
 
     records = read_study(out)
     if json_output:
@@ -158,8 +158,8 @@ def report(
 
 def print_expectations(study: Path) -> None:
     """Print what the thesis leads one to expect, and whether these records bear it out."""
-    from retraverse.studies.expectations import check_expectations
-    from retraverse.studies.light_records import read_light_records, study_folders
+    from retraverse.studies.judging.expectations import check_expectations
+    from retraverse.studies.keeping.light_records import read_light_records, study_folders
 
     for expectation in check_expectations(read_light_records(study_folders(study))):
         print(f"{expectation.verdict}: {expectation.claim} {expectation.numbers}")
@@ -196,7 +196,7 @@ def _brief(record: "RunRecord") -> dict[str, Any]:
 
 def _print_reasons(out: Path) -> None:
     """Say why runs failed, each reason once."""
-    from retraverse.studies.study_folder import read_study
+    from retraverse.studies.keeping.study_folder import read_study
 
     reasons = Counter(
         f"{record.status}: {record.error}" for record in read_study(out) if record.status != "ok"

@@ -16,7 +16,7 @@ from retraverse.cli.options import (
 from retraverse.cli.output import print_json, print_table, progress, remark
 from retraverse.images import open_traverse
 from retraverse.registry import read_parameters
-from retraverse.studies.quantisation import TuningPlan
+from retraverse.studies.measuring.quantisation import TuningPlan
 from retraverse.techniques.running.extras import import_extra
 
 if TYPE_CHECKING:
@@ -259,8 +259,8 @@ def jpeg_tables(
     A plan's encoder takes the file: `encoders = [{ optimize = true, tables = "tables.json" }]`, at
     c = 50. Whether it pays depends on the technique; for most it does not.
     """
-    from retraverse.studies.quantisation import tune_tables
-    from retraverse.studies.tables_file import save_tables
+    from retraverse.studies.measuring.quantisation import tune_tables
+    from retraverse.studies.plans.tables_file import save_tables
 
     found = tune_tables(
         open_traverse(drive),

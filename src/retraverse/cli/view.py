@@ -37,7 +37,7 @@ def view(
     """
     from retraverse.reports import write_study_report
     from retraverse.reports.study_report.serve import StudyServer
-    from retraverse.studies.light_records import study_folders
+    from retraverse.studies.keeping.light_records import study_folders
 
     study_folders(study)  # raises where there is none
 
@@ -75,8 +75,8 @@ def pictures_of(study: Path, data: Path | None) -> Any:
         If the data root is not there.
     """
     from retraverse.datasets.driven_again import find_driven
-    from retraverse.studies.light_records import study_folders
-    from retraverse.studies.study_folder import study_datasets
+    from retraverse.studies.keeping.light_records import study_folders
+    from retraverse.studies.keeping.study_folder import study_datasets
 
     if data is None:
         folders = study_folders(study)

@@ -13,11 +13,11 @@ from retraverse.studies.comparison_record import (
     TraverseRecord,
 )
 from retraverse.studies.engine import StudyResult, run_study
-from retraverse.studies.plan import MatcherChoice, PicturePair, StudyPlan, TechniqueChoice
-from retraverse.studies.plan_checks import PlanError
-from retraverse.studies.plan_file import load_plan
-from retraverse.studies.records import RunRecord, read_records, write_records
-from retraverse.studies.study_folder import read_study
+from retraverse.studies.keeping.records import RunRecord, read_records, write_records
+from retraverse.studies.keeping.study_folder import read_study
+from retraverse.studies.plans.plan import MatcherChoice, PicturePair, StudyPlan, TechniqueChoice
+from retraverse.studies.plans.plan_checks import PlanError
+from retraverse.studies.plans.plan_file import load_plan
 
 __all__ = [
     "ComparePlan",

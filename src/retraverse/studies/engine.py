@@ -21,19 +21,19 @@ import numpy as np
 
 from retraverse.errors import InputError
 from retraverse.maps.describe import available_cores
-from retraverse.studies.cache import StudyCache
-from retraverse.studies.describe_task import Described
-from retraverse.studies.empty_roi import EmptyRoiCount
-from retraverse.studies.match_task import InHand, Matched, MatchTask, Source, failed_runs
-from retraverse.studies.plan import StudyPlan
-from retraverse.studies.plan_checks import PlanError, plan_problems
-from retraverse.studies.records import RunRecord
-from retraverse.studies.run_provenance import RunProvenance
-from retraverse.studies.runs import Job
-from retraverse.studies.schedule import Schedule
-from retraverse.studies.study_folder import StudyFolder
-from retraverse.studies.work import Work, plan_work, wanted_entries
-from retraverse.studies.workers import InlinePool, Pool, ProcessPool, Task, lost_task
+from retraverse.studies.keeping.cache import StudyCache
+from retraverse.studies.keeping.records import RunRecord
+from retraverse.studies.keeping.study_folder import StudyFolder
+from retraverse.studies.plans.plan import StudyPlan
+from retraverse.studies.plans.plan_checks import PlanError, plan_problems
+from retraverse.studies.tasks.describe_task import Described
+from retraverse.studies.tasks.empty_roi import EmptyRoiCount
+from retraverse.studies.tasks.match_task import InHand, Matched, MatchTask, Source, failed_runs
+from retraverse.studies.tasks.run_provenance import RunProvenance
+from retraverse.studies.tasks.runs import Job
+from retraverse.studies.tasks.schedule import Schedule
+from retraverse.studies.tasks.work import Work, plan_work, wanted_entries
+from retraverse.studies.tasks.workers import InlinePool, Pool, ProcessPool, Task, lost_task
 from retraverse.types import Array, Progress, no_progress
 
 __all__ = ["StudyResult", "run_study"]
@@ -313,7 +313,7 @@ class _Pictures:
 
 def _pool(plan: StudyPlan, work: Work, workers: int, cluster: str | None, cache: Path) -> Pool:
     if cluster is not None:
-        from retraverse.studies.cluster import DaskPool
+        from retraverse.studies.tasks.cluster import DaskPool
 
         return DaskPool(cluster, plan.modules, cache)
     if work.is_quick or workers == 0:

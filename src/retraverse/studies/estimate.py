@@ -10,11 +10,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from retraverse.studies.cache import StudyCache
-from retraverse.studies.describe_task import DescribeTask, describe_task, made_technique
-from retraverse.studies.plan import StudyPlan
-from retraverse.studies.schedule import COST_S, describe_cost, match_s
-from retraverse.studies.work import Work, plan_work
+from retraverse.studies.keeping.cache import StudyCache
+from retraverse.studies.plans.plan import StudyPlan
+from retraverse.studies.tasks.describe_task import DescribeTask, describe_task, made_technique
+from retraverse.studies.tasks.schedule import COST_S, describe_cost, match_s
+from retraverse.studies.tasks.work import Work, plan_work
 from retraverse.types import Progress, no_progress
 
 __all__ = ["Estimate", "estimate_study"]

@@ -12,9 +12,9 @@ from retraverse.errors import InputError
 from retraverse.images import Frame
 from retraverse.maps.describe import DescribedFrame, Describer, Frames, count_frames
 from retraverse.maps.thumbnails import ThumbnailSpec
-from retraverse.studies.frames_task import DescribedFrames, FramesTask, choice_of
-from retraverse.studies.plan import CHUNK_FRAMES
-from retraverse.studies.workers import Pool, ProcessPool, lost_task
+from retraverse.studies.plans.plan import CHUNK_FRAMES
+from retraverse.studies.tasks.frames_task import DescribedFrames, FramesTask, choice_of
+from retraverse.studies.tasks.workers import Pool, ProcessPool, lost_task
 from retraverse.techniques import Technique
 from retraverse.types import Progress, no_progress
 
@@ -109,7 +109,7 @@ def describing_by(
 
 def _pool(workers: int | None, cluster: str | None) -> Pool | None:
     if cluster is not None:
-        from retraverse.studies.cluster import DaskPool
+        from retraverse.studies.tasks.cluster import DaskPool
 
         return DaskPool(cluster)
     if workers is None:

@@ -14,8 +14,8 @@ from pathlib import Path
 from retraverse.datasets.known import find_dataset, known_datasets
 from retraverse.errors import ConfigError, DataMissingError
 from retraverse.registry import unknown_name
-from retraverse.studies.plan import StudyPlan
-from retraverse.studies.plan_file import read_plan
+from retraverse.studies.plans.plan import StudyPlan
+from retraverse.studies.plans.plan_file import read_plan
 
 __all__ = ["CHAPTERS", "chapter_plans", "datasets_here"]
 

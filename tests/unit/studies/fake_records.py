@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from retraverse.studies.records import RunRecord
+from retraverse.studies.keeping.records import RunRecord
 
 
 def make_run(

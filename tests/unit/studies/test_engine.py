@@ -18,12 +18,12 @@ from retraverse.images.codecs import encode_group
 from retraverse.images.worsen import frame_bytes, worsened
 from retraverse.images.worsening import Worsening
 from retraverse.metrics import evaluate
-from retraverse.studies.cache import StudyCache, load_matrix
 from retraverse.studies.engine import run_study
 from retraverse.studies.estimate import estimate_study
-from retraverse.studies.plan_file import PlanError
-from retraverse.studies.study_folder import read_study
-from retraverse.studies.work import plan_work
+from retraverse.studies.keeping.cache import StudyCache, load_matrix
+from retraverse.studies.keeping.study_folder import read_study
+from retraverse.studies.plans.plan_file import PlanError
+from retraverse.studies.tasks.work import plan_work
 
 
 @pytest.fixture(autouse=True)
@@ -102,7 +102,8 @@ def test_parts_video_and_legibility_as_by_hand(
     data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("av", reason="the extra 'video' is not installed")
-    monkeypatch.setattr("retraverse.studies.describe_task.smallest_legible_height", made_up_height)
+    measured = "retraverse.studies.tasks.describe_task.smallest_legible_height"
+    monkeypatch.setattr(measured, made_up_height)
     plan = tiny_plan(
         data,
         sequence_lengths="[3]",
@@ -286,7 +287,7 @@ def test_seeds_move_intervals_only(data: Path, tmp_path: Path) -> None:
 
 
 def test_one_study_at_a_time_in_a_folder(data: Path, tmp_path: Path) -> None:
-    from retraverse.studies.study_folder import StudyFolder
+    from retraverse.studies.keeping.study_folder import StudyFolder
 
     with (
         StudyFolder.opened(tmp_path / "study"),

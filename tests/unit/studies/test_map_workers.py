@@ -15,7 +15,7 @@ from retraverse.errors import FrameReadError, InputError, RetraverseError
 from retraverse.images import Traverse
 from retraverse.maps import RouteMap
 from retraverse.studies.map_workers import PoolDescriber, describing_by
-from retraverse.studies.workers import Done, ProcessPool, Task, run_task
+from retraverse.studies.tasks.workers import Done, ProcessPool, Task, run_task
 
 Item = TypeVar("Item")
 N_FRAMES = 75

@@ -13,9 +13,9 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from retraverse.images import Frame
-from retraverse.studies.plan import StudyPlan
-from retraverse.studies.plan_file import read_plan
-from retraverse.studies.records import RunRecord
+from retraverse.studies.keeping.records import RunRecord
+from retraverse.studies.plans.plan import StudyPlan
+from retraverse.studies.plans.plan_file import read_plan
 from retraverse.techniques import ArraySpec, Description, Descriptions, Layout
 from retraverse.techniques import registry as technique_registry
 from retraverse.techniques.summarising.vectors import cosine_similarity

@@ -10,8 +10,8 @@ from functools import lru_cache
 
 from retraverse.reports.study_report.series import Series
 from retraverse.reports.svg import Plot
-from retraverse.studies.expectations import Expectation
-from retraverse.studies.records import RunRecord
+from retraverse.studies.judging.expectations import Expectation
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = [
     "Artefact",

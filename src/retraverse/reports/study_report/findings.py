@@ -16,8 +16,8 @@ from retraverse.reports.study_report.words import (
     size_text,
 )
 from retraverse.reports.wording import percent, seconds
-from retraverse.studies.records import RunRecord
-from retraverse.studies.selection import data_per_answer, length_of, mean_bytes
+from retraverse.studies.judging.selection import data_per_answer, length_of, mean_bytes
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = ["findings", "tells_interval"]
 

@@ -10,7 +10,7 @@ from retraverse.reports.study_report.words import (
     tolerance_text,
 )
 from retraverse.reports.wording import count
-from retraverse.studies.records import RunRecord
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = ["Trouble", "datasets_table", "headline", "troubles"]
 

@@ -6,7 +6,7 @@ from typing import Any
 from retraverse.reports.study_report.artefacts import Chapter, Figure, Line, Panel, slug
 from retraverse.reports.study_report.run_files import run_address
 from retraverse.reports.study_report.words import place_text, run_name
-from retraverse.studies.records import RunRecord
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = ["RunLinks", "chapter_points"]
 

@@ -13,7 +13,7 @@ from retraverse.images import Frame, Traverse
 from retraverse.reports.pictures import thumbnail
 from retraverse.reports.study_report.artefacts import slug
 from retraverse.reports.study_report.page_files import put
-from retraverse.studies.records import RunRecord
+from retraverse.studies.keeping.records import RunRecord
 from retraverse.types import ImageArray
 
 if TYPE_CHECKING:

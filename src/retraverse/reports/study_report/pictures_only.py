@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import replace
 
-from retraverse.studies.records import RunRecord
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = ["picture_runs"]
 

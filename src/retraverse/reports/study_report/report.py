@@ -39,13 +39,13 @@ from retraverse.reports.study_report.words import (
     dataset_title,
     number_columns,
 )
-from retraverse.studies.expectations import check_expectations
-from retraverse.studies.light_records import (
+from retraverse.studies.judging.expectations import check_expectations
+from retraverse.studies.keeping.light_records import (
     read_light_records,
     study_folders,
     with_long_columns,
 )
-from retraverse.studies.records import RunRecord
+from retraverse.studies.keeping.records import RunRecord
 from retraverse.types import Progress, no_progress
 
 __all__ = ["write_study_report"]

@@ -20,9 +20,9 @@ from retraverse.reports.study_report.words import (
     run_name,
 )
 from retraverse.reports.wording import count
-from retraverse.studies.cache import load_matrix
-from retraverse.studies.records import RunRecord
-from retraverse.studies.selection import data_per_answer
+from retraverse.studies.judging.selection import data_per_answer
+from retraverse.studies.keeping.cache import load_matrix
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = ["RunData"]
 

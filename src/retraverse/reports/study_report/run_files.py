@@ -19,13 +19,13 @@ from retraverse._version import __version__
 from retraverse.reports.study_report.page_files import put
 from retraverse.reports.study_report.picture_files import PictureFiles
 from retraverse.reports.study_report.run_data import RunData
-from retraverse.studies.records import RunRecord
-from retraverse.studies.selection import (
+from retraverse.studies.judging.selection import (
     Condition,
     condition_of,
     length_of,
     smallest_length,
 )
+from retraverse.studies.keeping.records import RunRecord
 from retraverse.types import Progress
 
 __all__ = ["RunFiles", "run_address"]

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from retraverse.reports.study_report.words import codec_title, compression_text, dataset_order
-from retraverse.studies.records import RunRecord
-from retraverse.studies.selection import condition_of
+from retraverse.studies.judging.selection import condition_of
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = ["Place", "Runs", "Series", "SeriesBook", "headline_runs", "is_whole", "place_of"]
 

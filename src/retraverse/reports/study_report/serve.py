@@ -16,8 +16,8 @@ from typing import Any
 from urllib.parse import unquote, urlsplit
 
 from retraverse.errors import InputError, RetraverseError
-from retraverse.studies.light_records import study_folders
-from retraverse.studies.records import record_files
+from retraverse.studies.keeping.light_records import study_folders
+from retraverse.studies.keeping.records import record_files
 
 __all__ = ["StudyServer"]
 

@@ -7,7 +7,7 @@ from retraverse.datasets.driven_again import recorded_name
 from retraverse.datasets.known import known_dataset, known_datasets
 from retraverse.metrics import DEFINITIONS
 from retraverse.reports.wording import NARROW, NOTHING, count, percent, plain, ratio, seconds
-from retraverse.studies.records import RunRecord
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = [
     "MEANINGS",

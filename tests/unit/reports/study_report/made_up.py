@@ -10,8 +10,8 @@ import numpy as np
 
 from retraverse.datasets import GroundTruth, aligned
 from retraverse.images import Frame, Traverse
-from retraverse.studies.cache import StudyCache
-from retraverse.studies.records import RunRecord, write_records
+from retraverse.studies.keeping.cache import StudyCache
+from retraverse.studies.keeping.records import RunRecord, write_records
 
 ROUTES = {"corridor": 60, "campus_loop": 100}
 """Made-up numbers of frames; Campus Loop has the thesis' own, so its values are printed."""

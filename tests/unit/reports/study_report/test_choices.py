@@ -7,8 +7,8 @@ import pytest
 from tests.unit.reports.study_report.made_up import make_run
 
 from retraverse.reports.study_report.choices import cheapest, choices_table, frame_seconds
-from retraverse.studies.records import RunRecord
-from retraverse.studies.selection import data_per_answer
+from retraverse.studies.judging.selection import data_per_answer
+from retraverse.studies.keeping.records import RunRecord
 
 
 def setting(

@@ -7,7 +7,7 @@ import pytest
 from tests.unit.reports.study_report.made_up import chapter_runs, make_run
 
 from retraverse.reports.study_report.findings import findings, tells_interval
-from retraverse.studies.records import RunRecord
+from retraverse.studies.keeping.records import RunRecord
 
 
 def run(

@@ -10,9 +10,9 @@ from retraverse.datasets.simulated import Camera, Disturbances, simulate_route, 
 from retraverse.reports import write_study_report
 from retraverse.reports.study_report.run_files import run_address
 from retraverse.studies.engine import run_study
-from retraverse.studies.expectations import check_expectations
-from retraverse.studies.light_records import read_light_records
-from retraverse.studies.plan_file import read_plan
+from retraverse.studies.judging.expectations import check_expectations
+from retraverse.studies.keeping.light_records import read_light_records
+from retraverse.studies.plans.plan_file import read_plan
 
 PLAN = """
 name = "street"

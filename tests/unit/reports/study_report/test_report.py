@@ -26,7 +26,7 @@ from retraverse.errors import DataMissingError, InputError
 from retraverse.reports import write_study_report
 from retraverse.reports.study_report.picture_files import PictureFiles, Side
 from retraverse.reports.study_report.run_files import RunFiles
-from retraverse.studies.records import RunRecord
+from retraverse.studies.keeping.records import RunRecord
 from retraverse.types import no_progress
 
 PAGES = ("index", "chapter-3", "chapter-4", "chapter-5", "chapter-6", "chapter-7", "runs")

@@ -11,7 +11,7 @@ from retraverse.reports.study_report.pictures_only import picture_runs
 from retraverse.reports.study_report.run_files import run_address
 from retraverse.reports.study_report.series import Runs, SeriesBook, is_whole, place_of
 from retraverse.reports.study_report.words import place_text
-from retraverse.studies.records import RunRecord
+from retraverse.studies.keeping.records import RunRecord
 
 WHOLE = make_run(compression=(97, 97))
 PART = make_run(compression=(97, 97), jpeg_part="grid")

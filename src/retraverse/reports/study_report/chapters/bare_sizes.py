@@ -12,7 +12,7 @@ from retraverse.reports.study_report.words import (
     meanings,
     size_text,
 )
-from retraverse.studies.records import RunRecord
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = ["bare_table"]
 

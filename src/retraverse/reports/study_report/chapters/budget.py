@@ -12,8 +12,8 @@ from retraverse.reports.study_report.chapters.context import (
 from retraverse.reports.study_report.chapters.curves import curves_by_line
 from retraverse.reports.study_report.series import Runs, Series
 from retraverse.reports.study_report.words import dataset_title, meanings
-from retraverse.studies.records import RunRecord
-from retraverse.studies.selection import largest_within
+from retraverse.studies.judging.selection import largest_within
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = ["budget_tables"]
 

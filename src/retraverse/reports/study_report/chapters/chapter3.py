@@ -27,8 +27,8 @@ from retraverse.reports.study_report.panels import draw_bars, draw_lines
 from retraverse.reports.study_report.series import Runs, Series
 from retraverse.reports.study_report.words import dataset_title, meanings, measured_on
 from retraverse.reports.wording import plain, ratio
-from retraverse.studies.records import RunRecord
-from retraverse.studies.selection import per_compute_unit
+from retraverse.studies.judging.selection import per_compute_unit
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = ["chapter_3", "precision_recall_figure"]
 

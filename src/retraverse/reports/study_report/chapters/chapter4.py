@@ -30,13 +30,13 @@ from retraverse.reports.study_report.published import published_value
 from retraverse.reports.study_report.series import Runs
 from retraverse.reports.study_report.words import dataset_title, meanings
 from retraverse.reports.wording import NOTHING
-from retraverse.studies.records import RunRecord
-from retraverse.studies.selection import (
+from retraverse.studies.judging.selection import (
     boost,
     length_of,
     per_compute_unit,
     smallest_length,
 )
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = ["chapter_4", "smallest_table"]
 

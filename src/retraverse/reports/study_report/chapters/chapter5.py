@@ -28,8 +28,8 @@ from retraverse.reports.study_report.words import (
     meanings,
     size_text,
 )
-from retraverse.studies.records import RunRecord
-from retraverse.studies.selection import mean_bytes
+from retraverse.studies.judging.selection import mean_bytes
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = ["chapter_5", "dataset_sizes", "non_uniform_figures"]
 

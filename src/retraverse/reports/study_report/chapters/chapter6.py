@@ -24,8 +24,8 @@ from retraverse.reports.study_report.pictures_only import picture_runs
 from retraverse.reports.study_report.series import Runs
 from retraverse.reports.study_report.words import compression_text, meanings, size_text
 from retraverse.reports.wording import NOTHING
-from retraverse.studies.records import RunRecord
-from retraverse.studies.selection import data_per_answer, mean_bytes
+from retraverse.studies.judging.selection import data_per_answer, mean_bytes
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = ["chapter_6"]
 

@@ -31,7 +31,7 @@ from retraverse.reports.study_report.published import published_value
 from retraverse.reports.study_report.series import Runs, Series
 from retraverse.reports.study_report.words import meanings
 from retraverse.reports.wording import NOTHING
-from retraverse.studies.records import RunRecord
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = ["chapter_7", "time_figure"]
 

@@ -10,7 +10,7 @@ from retraverse.reports.study_report.published import BY_CHAPTER, published_valu
 from retraverse.reports.study_report.series import Runs, Series, SeriesBook, headline_runs
 from retraverse.reports.study_report.words import dataset_title
 from retraverse.reports.wording import NOTHING, percent, plain, ratio, seconds
-from retraverse.studies.records import RunRecord
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = [
     "ChapterInput",

@@ -2,8 +2,8 @@
 
 from retraverse.reports.study_report.figures import plainest
 from retraverse.reports.study_report.series import Runs, Series
-from retraverse.studies.records import RunRecord
-from retraverse.studies.selection import length_of
+from retraverse.studies.judging.selection import length_of
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = ["curves_by_line", "fixed_curve"]
 

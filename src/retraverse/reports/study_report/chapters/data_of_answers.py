@@ -12,8 +12,8 @@ from retraverse.reports.study_report.chapters.context import (
 from retraverse.reports.study_report.figures import PERCENT, scattered
 from retraverse.reports.study_report.series import Runs, Series
 from retraverse.reports.study_report.words import compression_text, meanings, size_text
-from retraverse.studies.records import RunRecord
-from retraverse.studies.selection import data_per_answer, length_of, smallest_length
+from retraverse.studies.judging.selection import data_per_answer, length_of, smallest_length
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = ["data_figure", "first_full", "frontier", "smallest_data_table"]
 

@@ -27,7 +27,7 @@ from retraverse.reports.study_report.words import (
     meanings,
     size_text,
 )
-from retraverse.studies.selection import data_per_answer, length_of
+from retraverse.studies.judging.selection import data_per_answer, length_of
 
 __all__ = ["free_plan", "free_sections"]
 

@@ -16,8 +16,8 @@ from retraverse.reports.study_report.figures import over_cases
 from retraverse.reports.study_report.series import Place, Runs, Series
 from retraverse.reports.study_report.words import dataset_title, meanings
 from retraverse.reports.wording import NOTHING
-from retraverse.studies.records import RunRecord
-from retraverse.studies.selection import data_per_answer
+from retraverse.studies.judging.selection import data_per_answer
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = ["Pick", "least_data_picks", "mixed_figures", "total_table"]
 

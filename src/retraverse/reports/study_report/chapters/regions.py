@@ -16,7 +16,7 @@ from retraverse.reports.study_report.artefacts import Gallery, GalleryPicture, G
 from retraverse.reports.study_report.chapters.context import ChapterInput
 from retraverse.reports.study_report.picture_files import PictureFiles
 from retraverse.reports.study_report.words import dataset_order, dataset_title
-from retraverse.studies.records import RunRecord
+from retraverse.studies.keeping.records import RunRecord
 from retraverse.techniques.convsequential import ConvSequential, ConvSequentialParameters
 from retraverse.types import BoolArray, FloatArray, ImageArray
 

@@ -11,8 +11,8 @@ from retraverse.reports.study_report.chapters.context import (
 from retraverse.reports.study_report.series import Runs
 from retraverse.reports.study_report.words import meanings, size_text
 from retraverse.reports.wording import NOTHING
-from retraverse.studies.records import RunRecord
-from retraverse.studies.saving import Saving, savings
+from retraverse.studies.judging.saving import Saving, savings
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = ["SENT_AT", "savings_table"]
 

@@ -8,7 +8,7 @@ from retraverse.reports.study_report.artefacts import Case, Sheet
 from retraverse.reports.study_report.chapters.context import ChapterInput
 from retraverse.reports.study_report.picture_files import PictureFiles, Side
 from retraverse.reports.study_report.words import dataset_order, dataset_title, length_words
-from retraverse.studies.records import RunRecord
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = ["match_sheets"]
 

@@ -18,8 +18,8 @@ from retraverse.reports.study_report.figures.values import (
 )
 from retraverse.reports.study_report.series import Place, Runs, Series
 from retraverse.reports.study_report.words import compression_text
-from retraverse.studies.records import RunRecord
-from retraverse.studies.selection import length_of
+from retraverse.studies.judging.selection import length_of
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = ["over_compression", "over_length", "over_size"]
 

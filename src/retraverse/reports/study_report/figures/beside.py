@@ -9,7 +9,7 @@ from retraverse.reports.study_report.figures.values import PERCENT, Value, first
 from retraverse.reports.study_report.panels import draw_dots, draw_lines
 from retraverse.reports.study_report.series import Runs, Series
 from retraverse.reports.study_report.words import dataset_title, measured_on
-from retraverse.studies.records import RunRecord
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = ["over_cases", "scattered", "side_by_side"]
 

@@ -8,7 +8,7 @@ from retraverse.reports.study_report.figures.values import Value
 from retraverse.reports.study_report.panels import draw_lines
 from retraverse.reports.study_report.series import Runs, Series
 from retraverse.reports.study_report.words import dataset_title, measured_on
-from retraverse.studies.records import RunRecord
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = ["dataset_panels", "line_of_runs", "with_left_out"]
 

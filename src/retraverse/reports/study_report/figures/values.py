@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 
 from retraverse.reports.study_report.series import Place, Runs, Series
-from retraverse.studies.records import RunRecord
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = [
     "PERCENT",

@@ -10,7 +10,7 @@ from tests.unit.reports.test_comparison_report import Page
 from retraverse.images import Frame, Traverse
 from retraverse.reports import write_study_report
 from retraverse.reports.study_report.chapters.regions import THRESHOLDS, shaded
-from retraverse.studies.records import RunRecord
+from retraverse.studies.keeping.records import RunRecord
 
 
 class HalfNoise(MadeUpDrives):

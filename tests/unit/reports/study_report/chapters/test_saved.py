@@ -8,7 +8,7 @@ from pathlib import Path
 from tests.unit.reports.study_report.made_up import make_run, write_study
 
 from retraverse.reports import write_study_report
-from retraverse.studies.records import RunRecord
+from retraverse.studies.keeping.records import RunRecord
 
 
 def runs_at(compression: int, n_bytes: int, *accuracies: float) -> list[RunRecord]:

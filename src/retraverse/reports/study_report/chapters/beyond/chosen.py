@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 from retraverse.datasets.driven_again import recorded_name
 from retraverse.reports.study_report.series import is_whole, place_of
-from retraverse.studies.records import RunRecord
-from retraverse.studies.selection import Condition, condition_of
+from retraverse.studies.judging.selection import Condition, condition_of
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = [
     "Setting",

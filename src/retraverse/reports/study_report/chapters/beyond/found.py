@@ -19,8 +19,8 @@ from retraverse.reports.study_report.chapters.beyond.reading import character_di
 from retraverse.reports.study_report.chapters.beyond.video import JPEG, VideoCase, video_cases
 from retraverse.reports.study_report.words import length_words, place_text
 from retraverse.reports.wording import percent, points
-from retraverse.studies.records import RunRecord
-from retraverse.studies.selection import data_per_answer
+from retraverse.studies.judging.selection import data_per_answer
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = ["beyond_findings"]
 

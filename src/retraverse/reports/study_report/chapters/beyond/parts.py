@@ -22,7 +22,7 @@ from retraverse.reports.study_report.words import (
     measured_on,
 )
 from retraverse.reports.wording import NOTHING, percent, points
-from retraverse.studies.records import RunRecord
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = ["ALL_PARTS", "REAL_PARTS", "PartColumn", "part_artefacts", "part_columns"]
 

@@ -14,7 +14,7 @@ from retraverse.reports.study_report.words import (
     measured_on,
 )
 from retraverse.reports.wording import NOTHING, percent
-from retraverse.studies.records import RunRecord
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = ["CAUTION", "character_distance", "reading_artefacts"]
 

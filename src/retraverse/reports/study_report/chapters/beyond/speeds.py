@@ -18,7 +18,7 @@ from retraverse.reports.study_report.words import (
     tolerance_text,
 )
 from retraverse.reports.wording import NOTHING, percent
-from retraverse.studies.records import RunRecord
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = ["speed_artefacts"]
 

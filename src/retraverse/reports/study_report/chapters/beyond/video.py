@@ -21,8 +21,8 @@ from retraverse.reports.study_report.words import (
     size_text,
 )
 from retraverse.reports.wording import NOTHING
-from retraverse.studies.records import RunRecord
-from retraverse.studies.selection import data_per_answer
+from retraverse.studies.judging.selection import data_per_answer
+from retraverse.studies.keeping.records import RunRecord
 
 __all__ = ["JPEG", "VideoCase", "video_artefacts", "video_cases"]
 

@@ -8,8 +8,8 @@ from typing import Any
 
 from tests.unit.reports.study_report.made_up import make_run
 
-from retraverse.studies.records import RunRecord
-from retraverse.studies.selection import condition_of
+from retraverse.studies.judging.selection import condition_of
+from retraverse.studies.keeping.records import RunRecord
 
 PARTS = ("luminance", "colour", "grid", "2 bands smooth")
 PART_ACCURACY = {"": 0.5, "luminance": 0.55, "colour": 0.8, "grid": 0.7, "2 bands smooth": 0.3}

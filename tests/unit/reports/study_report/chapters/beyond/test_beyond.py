@@ -31,7 +31,7 @@ from retraverse.reports.study_report.chapters.beyond.found import beyond_finding
 from retraverse.reports.study_report.chapters.beyond.parts import part_columns
 from retraverse.reports.study_report.chapters.beyond.reading import character_distance
 from retraverse.reports.study_report.chapters.beyond.video import JPEG, video_cases
-from retraverse.studies.records import RunRecord
+from retraverse.studies.keeping.records import RunRecord
 
 SECTIONS = (
     "Which matcher bears compression?",

@@ -10,7 +10,7 @@ from tests.unit.reports.test_comparison_report import Page
 
 from retraverse.reports import write_study_report
 from retraverse.reports.study_report.chapters.beyond.chosen import compared_matchers
-from retraverse.studies.records import RunRecord
+from retraverse.studies.keeping.records import RunRecord
 
 ACCURACY = {
     ("hog", "mean"): 0.4,
