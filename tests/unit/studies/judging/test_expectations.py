@@ -128,7 +128,10 @@ def test_failed_runs_do_not_count() -> None:
     assert judged("accuracy-rises", runs).holds is None
 
 
-@pytest.mark.parametrize("beyond", [{"jpeg_part": "grid"}, {"video": "av1", "video_quality": 40}])
+@pytest.mark.parametrize(
+    "beyond",
+    [{"jpeg_part": "grid"}, {"video": "av1", "video_quality": 40}, {"chapter": "beyond"}],
+)
 def test_what_the_thesis_does_not_speak_of_does_not_count(beyond: dict[str, object]) -> None:
     rises = lengths(0.5, 0.6)
     falls = [replace(run, **beyond) for run in lengths(0.9, 0.1)]  # type: ignore[arg-type]
