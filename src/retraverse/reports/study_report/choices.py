@@ -8,8 +8,8 @@ from retraverse.datasets.driven_again import recorded_name
 from retraverse.reports.study_report.artefacts import Cell, Row, Table
 from retraverse.reports.study_report.series import Runs, SeriesBook
 from retraverse.reports.study_report.words import (
+    codec_title,
     compression_text,
-    damage_text,
     dataset_title,
     length_words,
     meanings,
@@ -134,7 +134,8 @@ def _cells(runs: Runs, run: RunRecord) -> tuple[Cell, ...]:
         Cell(f"{run.mean_sequence_length:.3g}", run.mean_sequence_length, note=dynamic),
         Cell(
             _compressions(run),
-            float(max(run.compression_query, run.compression_reference)),
+            # Video has no c: exports then write its words.
+            math.inf if run.video else float(max(run.compression_query, run.compression_reference)),
             note=" ".join(run.encoder.split()[2:]),
         ),
         Cell(f"{run.resize} px" if run.resize else "as is", float(run.resize or math.inf)),
@@ -156,7 +157,8 @@ def _cells(runs: Runs, run: RunRecord) -> tuple[Cell, ...]:
 def _compressions(run: RunRecord) -> str:
     query, reference = run.compression_query, run.compression_reference
     if run.video:
-        return f"{damage_text(run)} query, {compression_text(reference)} map"
+        # That its pictures come in groups, and what the map is, says the run itself.
+        return f"{codec_title(run.video)} crf {run.video_quality}"
     if query == reference:
         return compression_text(query)
     return f"{compression_text(query)} query, {compression_text(reference)} map"

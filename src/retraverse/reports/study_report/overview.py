@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from retraverse.datasets.driven_again import recorded_name
 from retraverse.reports.study_report.artefacts import Cell, Row, Table
 from retraverse.reports.study_report.words import (
     dataset_order,
@@ -63,7 +64,7 @@ def troubles(records: Iterable[RunRecord]) -> list[Trouble]:
 def headline(records: Sequence[RunRecord]) -> str:
     """Return what the study is, in one line."""
     measured = [run for run in records if run.status == "ok"]
-    datasets = {run.dataset for run in measured}
+    datasets = {recorded_name(run.dataset)[0] for run in measured}
     techniques = {run.technique for run in measured}
     return (
         f"{count(len(measured), 'run')}: {count(len(techniques), 'technique')} on "

@@ -85,4 +85,4 @@ def test_one_part_of_jpeg_is_no_choice_and_video_is_one() -> None:
     assert video.run_id in opened
     assert part.run_id not in opened
     (compression,) = {row.cells[5].text for row in chosen if "bytes" in row.cells[2].text}
-    assert compression == "H.265 crf 36, groups of 8 query, as is map"
+    assert compression == "H.265 crf 36"
