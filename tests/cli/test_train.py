@@ -115,3 +115,5 @@ def test_jpeg_tables_go_into_a_plan(tmp_path: Path) -> None:
     write_pictures(tmp_path / "short", pictures(14, 8))
     with pytest.raises(InputError, match="got 8 frames, expected more than 10 to tune on"):
         train("jpeg-tables", tmp_path / "short", "-o", out, "-t", "sad")
+    with pytest.raises(InputError, match="to write into"):
+        train("jpeg-tables", tmp_path / "drive", "-o", tmp_path / "none" / "t.json", "-t", "sad")

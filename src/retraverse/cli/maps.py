@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from retraverse.cli.options import (
+    Cluster,
     Every,
     JsonOutput,
     MinMotion,
@@ -36,10 +37,6 @@ Positions = Annotated[
 Workers = Annotated[
     int | None,
     typer.Option("--workers", min=1, help="Processes that describe, for long drives."),
-]
-Cluster = Annotated[
-    str | None,
-    typer.Option("--cluster", help="Dask: tcp://HOST:PORT, tls://HOST:PORT, or local:WORKERS."),
 ]
 
 

@@ -105,6 +105,11 @@ Radius = Annotated[
     typer.Option("--radius", metavar="METRES", help="Truth: positions.csv in both folders."),
 ]
 
+Cluster = Annotated[
+    str | None,
+    typer.Option("--cluster", help="Dask: tcp://HOST:PORT, tls://HOST:PORT, or local:WORKERS."),
+]
+
 
 def open_drive(
     source: str, *, every: int, skip_bad: bool, min_motion: float, progress: Progress

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from retraverse.cli.options import JsonOutput, ShowPictures
+from retraverse.cli.options import Cluster, JsonOutput, ShowPictures
 from retraverse.cli.output import print_json, print_table, progress, remark
 
 if TYPE_CHECKING:
@@ -42,10 +42,7 @@ def run(
     data: DataRoot = None,
     cache: CachePath = None,
     workers: Workers = None,
-    cluster: Annotated[
-        str | None,
-        typer.Option("--cluster", help="Dask: tcp://HOST:PORT, tls://HOST:PORT, or local:WORKERS."),
-    ] = None,
+    cluster: Cluster = None,
     skip_missing: Annotated[
         bool, typer.Option("--skip-missing", help="Run without the datasets that are not here.")
     ] = False,

@@ -14,6 +14,7 @@ from retraverse.cli.options import (
     read_settings,
 )
 from retraverse.cli.output import print_json, print_table, progress, remark
+from retraverse.errors import InputError
 from retraverse.images import open_traverse
 from retraverse.registry import read_parameters
 from retraverse.studies.measuring.quantisation import TuningPlan
@@ -262,6 +263,9 @@ def jpeg_tables(
     from retraverse.studies.measuring.quantisation import tune_tables
     from retraverse.studies.plans.tables_file import save_tables
 
+    if not out.absolute().parent.is_dir():
+        # Said now and not after minutes of tuning.
+        raise InputError(f"--out {out}: no folder {out.parent} to write into")
     found = tune_tables(
         open_traverse(drive),
         make_technique(technique, settings),

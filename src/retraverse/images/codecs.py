@@ -39,6 +39,7 @@ from retraverse.types import ImageArray
 
 __all__ = [
     "GROUP_CODECS",
+    "LONGEST_GROUP",
     "CodecName",
     "GroupCodec",
     "check_quality",
@@ -47,7 +48,8 @@ __all__ = [
     "encode_group",
 ]
 
-_LONGEST_GROUP = 1000
+LONGEST_GROUP = 1000
+"""Pictures."""
 _ONE_BLOCK = 64
 """Side of x265's largest blocks."""
 
@@ -71,7 +73,9 @@ class GroupCodec:
     @property
     def label(self) -> str:
         """Encoder and settings in words, for records."""
-        return " ".join([self.encoder, *(f"{key}={text}" for key, text in self.options.items())])
+        words = [self.encoder, *(f"{key}={text}" for key, text in self.options.items())]
+        words += [f"(one block across: {key}={text})" for key, text in self.if_one_block.items()]
+        return " ".join(words)
 
     def options_for(self, height: int, width: int) -> dict[str, str]:
         """Return what is passed to the encoder for pictures of one size."""
@@ -218,8 +222,8 @@ def check_quality(settings: GroupCodec, quality: int) -> None:
 
 def _checked(images: Sequence[ImageArray]) -> list[ImageArray]:
     pictures = [check_array(image) for image in images]
-    if not 1 <= len(pictures) <= _LONGEST_GROUP:
-        raise InputError(f"group of pictures: got {len(pictures)}, expected 1 to {_LONGEST_GROUP}")
+    if not 1 <= len(pictures) <= LONGEST_GROUP:
+        raise InputError(f"group of pictures: got {len(pictures)}, expected 1 to {LONGEST_GROUP}")
     shapes = {picture.shape for picture in pictures}
     if len(shapes) > 1:
         raise ShapeError(f"group of pictures: got shapes {sorted(shapes)}, expected one")
@@ -235,7 +239,7 @@ def _encode(av: Any, settings: GroupCodec, quality: int, planes: list[Planes]) -
     context.time_base = Fraction(1, 25)
     context.framerate = Fraction(25, 1)
     context.thread_count = 1
-    context.gop_size = _LONGEST_GROUP
+    context.gop_size = LONGEST_GROUP
     context.options = {**settings.options_for(context.height, context.width), "crf": str(quality)}
     packets = []
     with _quiet_encoder():

@@ -9,12 +9,13 @@ Conventions
 - A frame's fingerprint names the original's and what was done, so that it is known without
   encoding; the ways to the same picture have the same one.
 - Groups of a video codec are counted from the first frame given; each picture is taken to weigh
-  its share of the group.
+  its share of the group, and its fingerprint names all pictures of the group.
 """
 
+import hashlib
 import threading
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -40,6 +41,9 @@ __all__ = [
     "worsen_group",
     "worsened",
 ]
+
+KEPT_GROUPS = 4
+"""Decoded groups of a lazy drive that are held: threads ask for frames a little out of order."""
 
 
 @dataclass(frozen=True)
@@ -78,10 +82,10 @@ def worsened(
     if worsening.is_nothing:
         return traverse
     listed = tuple(traverse)
-    groups = _groups(listed, worsening, cache)
+    sent = None if worsening.video is None else _SentGroups(listed, worsening, cache)
     frames = tuple(
-        replace(frame, pixels=_LazyPixels(frame.pixels, worsening, cache, group, place))
-        for frame, (group, place) in zip(listed, groups, strict=True)
+        replace(frame, pixels=_LazyPixels(frame.pixels, worsening, cache, sent, index))
+        for index, frame in enumerate(listed)
     )
     return replace(traverse, source=f"{traverse.source}, {worsening.label}", frames=frames)
 
@@ -146,13 +150,13 @@ def worsen_group(
     """
     sent, seconds = _as_group(frames, worsening, cache or PictureCache())
     sizes = np.diff(np.linspace(0, len(sent), len(frames) + 1).round().astype(int)).tolist()
+    held = [
+        _HeldPixels(None, picture, _identity_in_group(frames, place, worsening))
+        for place, picture in enumerate(decode_group(sent))
+    ]
     return [
-        WorsenedFrame(
-            replace(frame, pixels=_HeldPixels(None, picture, _identity(frame, worsening))),
-            n_bytes,
-            seconds / len(frames),
-        )
-        for frame, picture, n_bytes in zip(frames, decode_group(sent), sizes, strict=True)
+        WorsenedFrame(replace(frame, pixels=pixels), n_bytes, seconds / len(frames))
+        for frame, pixels, n_bytes in zip(frames, held, sizes, strict=True)
     ]
 
 
@@ -180,9 +184,9 @@ class _LazyPixels:
     original: Pixels
     worsening: Worsening
     cache: PictureCache | None
-    group: "_LazyGroup | None"
-    place: int
-    """In its group."""
+    sent: "_SentGroups | None"
+    index: int
+    """Among the frames that are sent."""
 
     def encoded(self) -> bytes | None:
         """Return the JPEG file, None where there is none."""
@@ -200,6 +204,8 @@ class _LazyPixels:
 
     def fingerprint(self) -> bytes:
         """Return what was done to which original; nothing is encoded for it."""
+        if self.sent is not None:
+            return self.sent.fingerprint(self.index)
         return self.worsening.fingerprint(self.original.fingerprint())
 
     def _resized(self) -> ImageArray:
@@ -211,40 +217,44 @@ class _LazyPixels:
         encoded = self.encoded()
         if encoded is not None:
             return _HeldPixels(encoded, None, b"")
-        if self.group is not None:
-            return _HeldPixels(None, self.group.pictures()[self.place], b"")
+        if self.sent is not None:
+            return _HeldPixels(None, self.sent.picture(self.index), b"")
         return _HeldPixels(None, _damaged(self._resized(), self.worsening), b"")
 
 
-class _LazyGroup:
-    """Some pictures of a drive that are sent together when one of them is asked for."""
+class _SentGroups:
+    """The pictures of a drive as they arrive in groups; those of the last few groups are kept."""
 
     def __init__(
         self, frames: Sequence[Frame], worsening: Worsening, cache: PictureCache | None
     ) -> None:
-        self._frames, self._worsening, self._cache = frames, worsening, cache
+        assert worsening.video is not None
+        self._frames, self._worsening = frames, worsening
+        self._cache = cache or PictureCache()
+        self._length = worsening.video.length
         self._lock = threading.Lock()
-        self._pictures: list[ImageArray] = []
+        self._kept: dict[int, list[ImageArray]] = {}
 
-    def pictures(self) -> list[ImageArray]:
-        """Return the pictures as they arrive; made once."""
+    def picture(self, index: int) -> ImageArray:
+        """Return the picture of one frame; its whole group is sent for it, if it is not kept."""
+        number, place = divmod(index, self._length)
         with self._lock:
-            if not self._pictures:
-                cache = self._cache or PictureCache()
-                sent, _ = _as_group(self._frames, self._worsening, cache)
-                self._pictures = decode_group(sent)
-            return self._pictures
+            pictures = self._kept.pop(number, None)
+            if pictures is None:
+                sent, _ = _as_group(self._group(number), self._worsening, self._cache)
+                pictures = decode_group(sent)
+            self._kept[number] = pictures  # now the youngest
+            while len(self._kept) > KEPT_GROUPS:
+                del self._kept[next(iter(self._kept))]
+        return pictures[place]
 
+    def fingerprint(self, index: int) -> bytes:
+        """Return what was done to which originals; nothing is encoded for it."""
+        number, place = divmod(index, self._length)
+        return _identity_in_group(self._group(number), place, self._worsening)
 
-def _groups(
-    frames: Sequence[Frame], worsening: Worsening, cache: PictureCache | None
-) -> Iterator[tuple[_LazyGroup | None, int]]:
-    """Yield each frame's group and its place there."""
-    length = 1 if worsening.video is None else worsening.video.length
-    for start in range(0, len(frames), length):
-        some = frames[start : start + length]
-        group = None if worsening.video is None else _LazyGroup(some, worsening, cache)
-        yield from ((group, place) for place in range(len(some)))
+    def _group(self, number: int) -> Sequence[Frame]:
+        return self._frames[number * self._length : (number + 1) * self._length]
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,7 +296,7 @@ def _worsen(frame: Frame, worsening: Worsening, cache: PictureCache) -> Worsened
     if worsening.video is not None:
         return worsen_group((frame,), worsening, cache=cache)[0]
     picture = cache.pixels(frame.pixels, worsening)
-    identity = _identity(frame, worsening)
+    identity = worsening.fingerprint(frame.pixels.fingerprint())
     if worsening.compression is None or not worsening.is_file:
         held = _HeldPixels(None, _damaged(picture, worsening), identity)
         return WorsenedFrame(replace(frame, pixels=held), picture.nbytes, 0.0)
@@ -321,8 +331,10 @@ def _as_group(
     return sent, time.perf_counter() - started
 
 
-def _identity(frame: Frame, worsening: Worsening) -> bytes:
-    return worsening.fingerprint(frame.pixels.fingerprint())
+def _identity_in_group(frames: Sequence[Frame], place: int, worsening: Worsening) -> bytes:
+    """Return what identifies one picture of a group: it depends on all the others."""
+    digests = [hashlib.sha256(frame.pixels.fingerprint()).digest() for frame in frames]
+    return worsening.fingerprint(b"".join([*digests, place.to_bytes(4, "big")]))
 
 
 @lru_cache

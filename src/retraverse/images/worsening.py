@@ -13,7 +13,13 @@ from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 from retraverse.errors import ConfigError
-from retraverse.images.codecs import GROUP_CODECS, CodecName, check_quality, codec_versions
+from retraverse.images.codecs import (
+    GROUP_CODECS,
+    LONGEST_GROUP,
+    CodecName,
+    check_quality,
+    codec_versions,
+)
 from retraverse.images.jpeg import Encoder, JpegLibrary, check_compression, encoder_versions
 from retraverse.images.jpeg_parts import JPEG_PARTS
 from retraverse.registry import unknown_name
@@ -25,7 +31,6 @@ Resizer = Literal["pillow", "opencv"]
 ``opencv``: `cv2.resize` with its default, bilinear without antialiasing (chapter 6)."""
 _FILTERS: dict[str, str] = {"pillow": "bicubic", "opencv": "bilinear"}
 LARGEST_SIDE = 16384
-_LONGEST_GROUP = 1000
 
 
 @dataclass(frozen=True)
@@ -43,10 +48,8 @@ class VideoGroups:
         if self.codec not in GROUP_CODECS:
             raise ConfigError(unknown_name("video codec", self.codec, list(GROUP_CODECS)))
         check_quality(GROUP_CODECS[self.codec], self.quality)
-        if not 1 <= self.length <= _LONGEST_GROUP:
-            raise ConfigError(
-                f"pictures a group: got {self.length}, expected 1 to {_LONGEST_GROUP}"
-            )
+        if not 1 <= self.length <= LONGEST_GROUP:
+            raise ConfigError(f"pictures a group: got {self.length}, expected 1 to {LONGEST_GROUP}")
 
     @property
     def label(self) -> str:

@@ -63,6 +63,8 @@ def _unnested(node: Node) -> Node:
     (child,) = node.children
     if set(node.attributes) & set(child.attributes) or (node.style and child.style):
         return node
+    if "clip-path" in node.attributes and "transform" in child.attributes:
+        return node  # On the child itself the clip path would be moved along.
     child.attributes = node.attributes | child.attributes
     child.style = child.style or node.style
     return child

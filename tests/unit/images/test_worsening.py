@@ -65,11 +65,41 @@ def test_a_drive_is_sent_in_whole_groups(codec: str, grey: bool) -> None:
         for frame in (lazy, made.frame):
             shown = frame.grey() if grey else frame.colour()
             np.testing.assert_array_equal(shown, picture)
+        assert lazy.fingerprint() == made.frame.fingerprint()
     assert sum(one.n_bytes for one in together[:3]) == len(groups[0])
     assert sum(one.n_bytes for one in together[3:]) == len(groups[1])
     assert max(one.n_bytes for one in together[:3]) - min(one.n_bytes for one in together[:3]) <= 1
     alone = worsen_frame(frames[4], way)
     assert alone.n_bytes == len(encode_group(drive[4:], codec, 40))  # type: ignore[arg-type]
+
+
+def test_a_picture_of_a_group_is_another_beside_other_pictures() -> None:
+    pytest.importorskip("av", reason="the extra 'video' is not installed")
+    way, drive = Worsening(video=VideoGroups("h265", 40, length=2)), pictures(4)
+    other = [drive[0], drive[1] // 2, *drive[2:]]
+    one, another = (worsened(open_traverse(shown), way) for shown in (drive, other))
+    same = [a.fingerprint() == b.fingerprint() for a, b in zip(one, another, strict=True)]
+    assert same == [False, False, True, True]
+    assert len({frame.fingerprint() for frame in one}) == 4
+
+
+def test_a_long_drive_in_groups_is_not_held(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("av", reason="the extra 'video' is not installed")
+    sent: list[int] = []
+
+    def counted(shown: list[ImageArray], *words: object) -> bytes:
+        sent.append(len(shown))
+        return encode_group(shown, *words)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("retraverse.images.worsen.encode_group", counted)
+    drive = worsened(open_traverse(pictures(12)), Worsening(video=VideoGroups("h265", 40, 2)))
+    for _ in range(2):
+        for frame in drive:
+            frame.grey()
+    assert sent.count(2) == 12, "each group is sent once a pass: none of the first pass is left"
+    drive[0].grey()
+    drive[1].grey()
+    assert sent.count(2) == 13
 
 
 @pytest.mark.parametrize(

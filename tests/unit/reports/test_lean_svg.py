@@ -89,6 +89,16 @@ def test_what_leaves_the_panel_is_cut_and_nothing_else() -> None:
     assert cut.count(f'clip-path="url(#{clip})"') >= 1
 
 
+def test_a_picture_is_cut_where_it_is_and_not_where_it_is_moved_from() -> None:
+    with drawing("picture"):
+        figure, axes = panel(200, 150)
+        axes.imshow([[0, 1], [1, 0]])
+        svg = svg_of(export(figure, axes, "two by two"))
+    (picture,) = svg.iter(f"{SVG}image")
+    assert picture.get("transform")
+    assert not any(one.get("transform") and one.get("clip-path") for one in svg.iter())
+
+
 @pytest.mark.filterwarnings("ignore:Glyph 7")
 def test_text_is_only_text() -> None:
     with drawing("hostile"):

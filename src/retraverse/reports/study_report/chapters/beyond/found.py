@@ -140,11 +140,15 @@ def _saved_by_video(cases: Sequence[VideoCase]) -> str:
     saved = {name: [share for case in cases if (share := _saved(case, name)) is not None]
              for name in codecs}  # fmt: skip
     words = [
-        f"{name} saves {100 * min(shares):.0f} to {100 * max(shares):.0f} % of JPEG's bytes"
+        f"{name} saves {_whole(min(shares))} to {_whole(max(shares))} % of JPEG's bytes"
         for name, shares in saved.items()
         if shares
     ]
     return f"at equal accuracy {'; '.join(words)}." if words else ""
+
+
+def _whole(share: float) -> str:
+    return f"{100 * share:.0f}".replace("-", "\u2212")
 
 
 def _saved(case: VideoCase, codec: str) -> float | None:
