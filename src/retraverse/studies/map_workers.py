@@ -1,7 +1,8 @@
 """Maps of long drives: described by worker processes or a Dask cluster, kept by one process.
 
 The workers are those of a study. Frames come back in order whoever is first, so that the map is
-the one that this process alone would make.
+the one that this process alone would make, but for the last digits of techniques that describe
+batches, whose size is measured where they run.
 """
 
 import itertools
