@@ -3,7 +3,8 @@
 A task is a plain value and its outcome is one too, whoever runs it; workers read pictures and
 write nothing. Each computes on one thread. A worker that dies (out of memory, killed) costs its
 task's time: another takes its place and the task is run again, up to `MOST_ATTEMPTS` times. When
-this process is killed its workers end too, in the middle of what they are at.
+this process is killed its workers end too, in the middle of what they are at. A worker lost while
+it starts is started anew as often.
 """
 
 import logging
@@ -40,7 +41,7 @@ logger = logging.getLogger(__name__)
 Task = DescribeTask | MatchTask | FramesTask
 Outcome = Described | Matched | DescribedFrames
 MOST_ATTEMPTS = 3
-"""A task whose worker was lost so often is given up: it is likely to be the reason."""
+"""A task, or a start, whose worker was lost so often is given up: it is likely to be the reason."""
 ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RETRAVERSE_THREADS"), "1"
 )
@@ -127,6 +128,8 @@ class _Worker:
     """The task it is at."""
     is_ready: bool = False
     """Whether it has started up."""
+    attempt: int = 1
+    """Counts the workers started one after another in this place, none of which got ready."""
 
 
 class ProcessPool:
@@ -186,7 +189,7 @@ class ProcessPool:
             worker.process.wait()
         self._workers = []
 
-    def _start(self) -> _Worker:
+    def _start(self, attempt: int = 1) -> _Worker:
         ours, theirs = Pipe()
         with theirs:
             numbers = map(str, (theirs.fileno(), os.getpid()))
@@ -197,7 +200,7 @@ class ProcessPool:
                 stdin=subprocess.DEVNULL,
                 stdout=2,  # What a technique prints must not get among our results.
             )
-        worker = _Worker(process, ours)
+        worker = _Worker(process, ours, attempt=attempt)
         ours.send(self._modules)
         return worker
 
@@ -235,9 +238,12 @@ class ProcessPool:
         lost = self._workers[index]
         lost.link.close()
         code = lost.process.wait()
-        if not lost.is_ready:
-            raise RetraverseError(f"a worker stopped before it was ready (exit code {code})")
-        self._workers[index] = self._start()
+        if not lost.is_ready and lost.attempt >= MOST_ATTEMPTS:
+            raise RetraverseError(
+                f"a worker was lost {lost.attempt} times before it was ready "
+                f"(exit code {code}; out of memory, or crashed?)"
+            )
+        self._workers[index] = self._start(1 if lost.is_ready else lost.attempt + 1)
         number = lost.number
         if number is None:
             return
