@@ -19,6 +19,7 @@ __all__ = [
     "Entry",
     "ParameterInfo",
     "Registry",
+    "changed_label",
     "describe_parameters",
     "read_parameters",
     "unknown_name",
@@ -123,6 +124,16 @@ def read_parameters(owner: str, parameter_class: type, values: Mapping[str, Any]
     return parameter_class(
         **{key: _read_value(owner, key, value, hints[key]) for key, value in values.items()}
     )
+
+
+def changed_label(name: str, parameters: Any) -> str:
+    """Return a name, and in brackets the parameters that are not at their defaults."""
+    changed = [
+        f"{field.name}={getattr(parameters, field.name)}"
+        for field in fields(parameters)
+        if getattr(parameters, field.name) != field.default
+    ]
+    return f"{name}({', '.join(changed)})" if changed else name
 
 
 def unknown_name(what: str, got: str, known: list[str]) -> str:

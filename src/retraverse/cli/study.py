@@ -117,7 +117,18 @@ def show(
         print_json([_brief(record) for record in records])
         return
     rows = [list(map(str, _line(record))) for record in records]
-    head = ("dataset", "technique", "matcher", "K", "c", "size", "accuracy", "AUC", "status")
+    head = (
+        "dataset",
+        "technique",
+        "matcher",
+        "K",
+        "c",
+        "size",
+        "sent",
+        "accuracy",
+        "AUC",
+        "status",
+    )
     print_table(rows, head=head)
 
 
@@ -166,12 +177,15 @@ def _line(record: "RunRecord") -> tuple[Any, ...]:
     """Return a record as a row of a table."""
     brief = _brief(record)
     shown = f"{record.accuracy:.3f} ({record.accuracy_low:.2f}-{record.accuracy_high:.2f})"
-    names = ("dataset", "technique", "matcher", "K", "c", "resize")
+    names = ("dataset", "technique", "matcher", "K", "c", "resize", "sent as")
     return (*(brief[name] for name in names), shown, brief["AUC"], brief["status"])
 
 
 def _brief(record: "RunRecord") -> dict[str, Any]:
     """Return the columns a person looks at first."""
+    from retraverse.reports.study_report.words import damage_text
+    from retraverse.studies.judging.selection import bytes_sent
+
     is_ok = record.status == "ok"
     sides = (record.compression_query, record.compression_reference)
     return {
@@ -185,7 +199,8 @@ def _brief(record: "RunRecord") -> dict[str, Any]:
         "low": round(record.accuracy_low, 3),
         "high": round(record.accuracy_high, 3),
         "AUC": round(record.auc, 3),
-        "bytes": round(record.query_bytes_mean) if is_ok else record.query_bytes_mean,
+        "sent as": record.descriptor_coding or damage_text(record) or "pictures",
+        "bytes": round(bytes_sent(record)) if is_ok else bytes_sent(record),
         "t_VPR ms": round(record.vpr_s * 1e3, 3),
         "status": record.status if is_ok else f"{record.status}: {record.error}",
     }

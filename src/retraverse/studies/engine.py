@@ -261,6 +261,7 @@ class _Run:
             runs=job.runs,
             truth=job.dataset.truth(),
             matrix=self._source(job.matrix_key, by_path) if has_matrix else None,
+            sent=job.sent,
             query=sources[0],
             reference=sources[1],
             query_entropy=query.entropy if job.needs_entropy else (),

@@ -40,9 +40,14 @@ class ArraySpec:
     dtype: str
 
     @property
+    def n_numbers(self) -> int:
+        """Numbers of one frame."""
+        return int(np.prod(self.shape, dtype=np.int64))
+
+    @property
     def n_bytes(self) -> int:
         """Bytes one frame takes."""
-        return int(np.prod(self.shape, dtype=np.int64)) * np.dtype(self.dtype).itemsize
+        return self.n_numbers * np.dtype(self.dtype).itemsize
 
 
 @dataclass(frozen=True)
@@ -62,7 +67,7 @@ class Layout:
     @property
     def dimension(self) -> int:
         """How many numbers the descriptor of one frame holds."""
-        return int(np.prod(self.descriptor.shape, dtype=np.int64))
+        return self.descriptor.n_numbers
 
 
 @dataclass(frozen=True)

@@ -17,13 +17,17 @@ from retraverse.images.bare_jpeg import TableSet, strip_tables
 from retraverse.images.codecs import encode_group
 from retraverse.images.worsen import frame_bytes, worsened
 from retraverse.images.worsening import Worsening
+from retraverse.matching.pairwise import describe_query
 from retraverse.metrics import evaluate
 from retraverse.studies.engine import run_study
 from retraverse.studies.estimate import estimate_study
+from retraverse.studies.judging.selection import data_per_answer
 from retraverse.studies.keeping.cache import StudyCache, load_matrix
+from retraverse.studies.keeping.records import RunRecord
 from retraverse.studies.keeping.study_folder import read_study
 from retraverse.studies.plans.plan_file import PlanError
 from retraverse.studies.tasks.work import plan_work
+from retraverse.techniques.sending import coding, received
 
 
 @pytest.fixture(autouse=True)
@@ -91,6 +95,67 @@ def test_dynamic_lengths_and_first_regions_as_by_hand(data: Path, tmp_path: Path
         assert by_length[text].answer_reference == tuple(matches.reference)
         assert by_length[text].mean_sequence_length == matches.sequence_length.mean()
     assert by_length["dynamic"].sequence_lengths == tuple(matches.sequence_length)
+
+
+def test_what_is_sent_as_by_hand(data: Path, tmp_path: Path) -> None:
+    plan = tiny_plan(
+        data,
+        sequence_lengths="[1, 3]",
+        sent='["pictures", "exact", { name = "projected", parameters = { dimensions = 2 } }]',
+        compression='{ levels = ["none"] }',
+    )
+    assert run_study(plan, tmp_path / "study", workers=0).n_ok == plan.n_runs == 6
+    (dataset,) = plan.datasets
+    technique = rt.technique("tiny")
+    route = rt.build_map(dataset.reference(), technique)
+    seen = describe_query(dataset.query(), route)
+    records = {(one.descriptor_coding, one.sequence_length): one for one in _records(tmp_path)}
+    kinds = {"": None, "exact": None, "projected(dimensions=2)": coding("projected", dimensions=2)}
+    for (label, length), record in records.items():
+        chosen = kinds[label]
+        arrived = seen if chosen is None else received(seen, route.descriptions(), chosen)
+        expected = rt.match(arrived, route, sequence_length=int(length))
+        assert record.answer_reference == tuple(expected.reference)
+        assert record.descriptor_bytes == 4 * 36
+    pictures, exact, few = (records[label, "1"] for label in kinds)
+    assert exact.accuracy == pictures.accuracy > few.accuracy  # Two numbers of 36 are too few.
+    assert (pictures.coded_bytes, pictures.coding_shared_bytes) == (-1, -1)
+    assert (exact.coded_bytes, exact.coding_shared_bytes) == (4 * 36, 0)
+    assert (few.coded_bytes, few.coding_shared_bytes) == (2, 4 * (3 * 36 + 2))
+    assert data_per_answer(records["projected(dimensions=2)", "3"]) == 6
+    assert data_per_answer(pictures) == pictures.query_bytes_mean
+
+
+def test_who_asks_for_codings_later_repeats_nothing(data: Path, tmp_path: Path) -> None:
+    plain = tiny_plan(data)
+    coded = tiny_plan(data, sent='["pictures", "int8"]')
+    first = run_study(plain, tmp_path / "study", workers=0)
+    second = run_study(coded, tmp_path / "study", workers=0)
+    assert (second.n_kept, second.n_ok, second.n_described) == (first.n_ok, first.n_ok, 0)
+
+
+def test_dynamic_windows_see_what_arrives(data: Path, tmp_path: Path) -> None:
+    plan = tiny_plan(
+        data,
+        techniques='[{ name = "convsequential", parameters = { resolution = 64 } }]',
+        sent='["int8"]',
+        sequence_lengths='["dynamic"]',
+        compression='{ levels = ["none"] }',
+        modules="[]",
+    )
+    run_study(plan, tmp_path / "study", workers=0)
+    (dataset,) = plan.datasets
+    route = rt.build_map(dataset.reference(), rt.technique("convsequential", resolution=64))
+    seen = describe_query(dataset.query(), route)
+    arrived = received(seen, route.descriptions(), coding("int8"))
+    (record,) = _records(tmp_path)
+    expected = rt.match(arrived, route, sequence_length="dynamic")
+    assert record.answer_reference == tuple(expected.reference)
+    assert record.answer_score == pytest.approx(expected.score)
+
+
+def _records(folder: Path) -> tuple[RunRecord, ...]:
+    return read_study(folder / "study")
 
 
 def made_up_height(worsening: Worsening) -> float:

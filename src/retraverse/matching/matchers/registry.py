@@ -1,11 +1,17 @@
 """The list of matchers: every module of this room adds its own."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 from retraverse.matching.matchers.base import Matcher
-from retraverse.registry import ParameterInfo, Registry, describe_parameters, read_parameters
+from retraverse.registry import (
+    ParameterInfo,
+    Registry,
+    changed_label,
+    describe_parameters,
+    read_parameters,
+)
 
 __all__ = ["MatcherInfo", "describe_matcher", "matcher", "matchers", "register"]
 
@@ -81,10 +87,4 @@ def matcher(name: str, **parameters: Any) -> Matcher:
 
 def describe_matcher(chosen: Matcher) -> str:
     """Return a matcher's name, and in brackets the parameters that are not at their defaults."""
-    parameters = chosen.parameters
-    changed = [
-        f"{field.name}={getattr(parameters, field.name)}"
-        for field in fields(parameters)
-        if getattr(parameters, field.name) != field.default
-    ]
-    return f"{chosen.name}({', '.join(changed)})" if changed else chosen.name
+    return changed_label(chosen.name, chosen.parameters)

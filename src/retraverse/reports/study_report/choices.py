@@ -42,8 +42,11 @@ _HEAD = (
 
 
 def frame_seconds(record: RunRecord) -> float:
-    """Return t_e + t_m: the work for every new picture once the robot is under way, seconds."""
-    return record.encode_s + record.match_s
+    """Return t_e + t_m: the work for every new picture once the robot is under way, seconds.
+
+    NaN where descriptors are sent: two machines share that work, and coding is not in it.
+    """
+    return math.nan if record.descriptor_coding else record.encode_s + record.match_s
 
 
 def cheapest(
@@ -65,8 +68,11 @@ def cheapest(
 def choices_table(records: Sequence[RunRecord]) -> Table:
     """Return, for every dataset and target, the settings of fewest bytes and of least time."""
     measured = [run for run in records if _can_be_chosen(run)]
-    # Named without encoder, video and resizer, which are written beside c where they count.
-    plain = [replace(run, encoder="", video="", group_length=0, resizer="") for run in measured]
+    # Named without encoder, resizer and what is sent, which are written beside c where they count.
+    plain = [
+        replace(run, encoder="", video="", group_length=0, resizer="", descriptor_coding="")
+        for run in measured
+    ]
     names = Runs(plain, SeriesBook({}))
     rows = [
         row
@@ -134,8 +140,10 @@ def _cells(runs: Runs, run: RunRecord) -> tuple[Cell, ...]:
         Cell(f"{run.mean_sequence_length:.3g}", run.mean_sequence_length, note=dynamic),
         Cell(
             _compressions(run),
-            # Video has no c: exports then write its words.
-            math.inf if run.video else float(max(run.compression_query, run.compression_reference)),
+            # Video and descriptors have no c: exports then write their words.
+            math.inf
+            if run.video or run.descriptor_coding
+            else float(max(run.compression_query, run.compression_reference)),
             note=" ".join(run.encoder.split()[2:]),
         ),
         Cell(f"{run.resize} px" if run.resize else "as is", float(run.resize or math.inf)),
@@ -156,6 +164,8 @@ def _cells(runs: Runs, run: RunRecord) -> tuple[Cell, ...]:
 
 def _compressions(run: RunRecord) -> str:
     query, reference = run.compression_query, run.compression_reference
+    if run.descriptor_coding:
+        return f"descriptors, {run.descriptor_coding}"
     if run.video:
         # That its pictures come in groups, and what the map is, says the run itself.
         return f"{codec_title(run.video)} crf {run.video_quality}"

@@ -64,8 +64,9 @@ class _Spoken:
         words = self.runs.series_of(run).label
         if run.sequence_length != "1":
             words += f", {_length(run)}"
-        # A line of one part of JPEG has its part in its name.
-        where = place_text(replace(run, jpeg_part="")) if place else "pictures"
+        # A line of one part of JPEG, or of a coding, has it in its name.
+        plain = replace(run, jpeg_part="", descriptor_coding="")
+        where = place_text(plain) if place else "pictures"
         return words if where.startswith("pictures") else f"{words}, {where}"
 
     def full(self, run: RunRecord, *, place: bool = False) -> str:

@@ -33,6 +33,7 @@ _SETTINGS = (
     ("Encoder", "encoder"),
     ("Part of JPEG", "jpeg_part"),
     ("Resizer", "resizer"),
+    ("Descriptors sent as", "descriptor_coding"),
     ("Ground truth", "truth"),
     ("Seed", "seed"),
 )

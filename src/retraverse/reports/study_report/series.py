@@ -86,8 +86,11 @@ def place_of(record: RunRecord) -> Place:
 
 
 def is_whole(record: RunRecord) -> bool:
-    """Say whether a run's pictures are JPEG files or as they are: no part of JPEG, no video."""
-    return not (record.jpeg_part or record.video)
+    """Say whether a run's pictures are sent, as JPEG files or as they are.
+
+    No part of JPEG, no video, no descriptors.
+    """
+    return not (record.jpeg_part or record.video or record.descriptor_coding)
 
 
 class _Key(NamedTuple):
@@ -98,6 +101,7 @@ class _Key(NamedTuple):
     jpeg_part: str
     video: str
     group_length: int
+    descriptor_coding: str
     resizer: str
     seed: int
     length: str
@@ -163,6 +167,7 @@ class Runs:
             record.jpeg_part,
             record.video,
             record.group_length,
+            record.descriptor_coding,
             record.resizer or self._usual_resizer,
             record.seed,
             "" if over_length else record.sequence_length,
@@ -209,7 +214,14 @@ def headline_runs(records: Sequence[RunRecord], *, at: Sequence[str] = ()) -> li
 
 def _kind(record: RunRecord) -> tuple[str, ...]:
     condition = condition_of(record)
-    return record.technique, condition.parameters, record.matcher, record.jpeg_part, record.video
+    return (
+        record.technique,
+        condition.parameters,
+        record.matcher,
+        record.jpeg_part,
+        record.video,
+        record.descriptor_coding,
+    )
 
 
 def _kept(lengths: set[str], at: Sequence[str]) -> set[str]:
@@ -253,6 +265,8 @@ def _names(keys: Sequence[_Key]) -> dict[_Key, str]:
             parts.append(f"{key.jpeg_part} alone")
         if key.video:
             parts.append(f"{codec_title(key.video)} in groups of {key.group_length}")
+        if key.descriptor_coding:
+            parts.append(f"sent as {key.descriptor_coding}")
         parts += _encoder_words(key.encoder, {other.encoder for other in keys})
         for name in ("resizer", "seed"):
             if len({getattr(other, name) for other in keys}) > 1:

@@ -22,6 +22,7 @@ __all__ = [
     "number_columns",
     "place_text",
     "run_name",
+    "sent_text",
     "size_text",
     "tolerance_text",
 ]
@@ -49,11 +50,12 @@ MEANINGS: Mapping[str, str] = {
     "t_VPR": "t_e × K + t_m: what one answer costs when all pictures of its window are described.",
     "t_c": "Compression time: resizing and JPEG-encoding one query picture.",
     "t_total": "t_VPR + t_c × K: one answer, compressing its pictures included.",
-    "d": "Data of one answer: mean bytes of a query picture × K.",
-    "window bytes": "Mean bytes of a query picture × K: what a robot sends for one answer; the "
-    "map's own pictures are not counted.",
-    "group bytes": "Mean bytes of a query picture × K; a picture of a video weighs its group's "
-    "bytes / the group's pictures.",
+    "d": "Data of one answer: mean bytes of a query picture × K; of its descriptor, where "
+    "descriptors are sent.",
+    "window bytes": "Mean bytes of a query picture, or of its descriptor where that is sent, × K: "
+    "what a robot sends for one answer; the map's own are not counted.",
+    "group bytes": "Mean bytes of what is sent for a query frame × K; a picture of a video weighs "
+    "its group's bytes / the group's pictures.",
     "time of a frame": "t_e + t_m: describing a new picture and matching the window that ends with "
     "it, when the descriptors of the frames before are kept.",
     "windows": "Query windows that were answered: Q − K + 1 for a fixed K.",
@@ -66,6 +68,8 @@ MEANINGS: Mapping[str, str] = {
     "PCU": "Precision per compute: P_R100 × log10(t_e of the slowest / t_e + 9); a sequence pays "
     "t_e K times.",
     "descriptor size": "Bytes of one picture's descriptor.",
+    "descriptor as sent": "Bytes of one query frame's descriptor in the coding it was sent in.",
+    "known before": "Bytes that both ends must have before the first descriptor is sent so.",
     "without keypoints": "Share of the query pictures in which the technique found nothing to "
     "describe.",
     "without tables": "Mean bytes of a query picture without what all JPEG files of one encoder "
@@ -124,6 +128,15 @@ def damage_text(record: RunRecord) -> str:
     return f"{record.jpeg_part} alone" if record.jpeg_part else ""
 
 
+def sent_text(record: RunRecord) -> str:
+    """Return how a query frame was sent: "c = 95", "crf 36", "sketch(bits=256)"."""
+    if record.descriptor_coding:
+        return record.descriptor_coding
+    if record.video:
+        return f"crf {record.video_quality}"
+    return f"c = {compression_text(record.compression_query)}"
+
+
 def codec_title(codec: str) -> str:
     """Return a video codec's name as people write it."""
     return _CODECS.get(codec, codec)
@@ -147,6 +160,8 @@ def place_text(record: RunRecord) -> str:
         parts.append(damage)
     if record.resize:
         parts.append(f"{record.resize} px")
+    if record.descriptor_coding:
+        parts.append(f"sent as {record.descriptor_coding}")
     return ", ".join(parts) or "pictures as they are"
 
 
@@ -190,6 +205,8 @@ def number_columns(record: RunRecord, data: float) -> list[tuple[str, str]]:
         ("d", size_text(data)),
         ("legible height", percent(record.legible_height)),
         ("descriptor size", size_text(record.descriptor_bytes)),
+        ("descriptor as sent", size_text(record.coded_bytes)),
+        ("known before", size_text(record.coding_shared_bytes)),
         ("t_e", seconds(record.encode_s)),
         ("t_m", seconds(record.match_s)),
         ("t_VPR", seconds(record.vpr_s)),

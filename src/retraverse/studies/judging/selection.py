@@ -22,6 +22,7 @@ __all__ = [
     "Curve",
     "SmallestLength",
     "boost",
+    "bytes_sent",
     "condition_of",
     "curves_of",
     "data_per_answer",
@@ -53,14 +54,16 @@ class Condition:
     video: str
     video_quality: int
     group_length: int
+    descriptor_coding: str
     resize: int
     resizer: str
     seed: int
 
     @property
     def is_uniform(self) -> bool:
-        """Say whether query and map pictures are compressed alike."""
-        return self.compression_query == self.compression_reference and not self.video
+        """Say whether query and map pictures are compressed alike, and sent as pictures."""
+        alike = self.compression_query == self.compression_reference
+        return alike and not (self.video or self.descriptor_coding)
 
 
 Curve = tuple[RunRecord, ...]
@@ -91,6 +94,7 @@ def condition_of(record: RunRecord) -> Condition:
         video=record.video,
         video_quality=record.video_quality,
         group_length=record.group_length,
+        descriptor_coding=record.descriptor_coding,
         resize=record.resize,
         resizer=record.resizer,
         seed=record.seed,
@@ -179,9 +183,17 @@ def mean_bytes(record: RunRecord) -> float:
     return (record.query_bytes_total + record.reference_bytes_total) / n_pictures
 
 
+def bytes_sent(record: RunRecord) -> float:
+    """Return the mean bytes that travel for one query frame: its picture, or its descriptor."""
+    return record.coded_bytes if record.descriptor_coding else record.query_bytes_mean
+
+
 def data_per_answer(record: RunRecord) -> float:
-    """Return d, the bytes of one window: mean size of a query picture x K; NaN if unknown."""
-    size, length = record.query_bytes_mean, record.mean_sequence_length
+    """Return d, the bytes of one window: mean size of a query picture x K; NaN if unknown.
+
+    Where descriptors are sent in place of pictures, it is theirs.
+    """
+    size, length = bytes_sent(record), record.mean_sequence_length
     if not (math.isfinite(size) and math.isfinite(length)):
         return math.nan
     return data_volume(size, length)

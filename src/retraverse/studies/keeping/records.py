@@ -134,6 +134,12 @@ class RunRecord:
     """Bytes of one picture's descriptor."""
     descriptor_dimension: int = -1
     """Numbers in it."""
+    descriptor_coding: str = ""
+    """How the query's descriptors were sent to where the map is; "" = its pictures were sent."""
+    coded_bytes: int = -1
+    """Bytes of one frame's descriptor as it was sent, -1 where pictures were."""
+    coding_shared_bytes: int = -1
+    """Bytes that both ends must have had before the first descriptor, -1 likewise."""
     no_descriptor_share: float = math.nan
     """Share of query pictures that gave no descriptor at all (ORB on small ones), in [0, 1]."""
     encode_s: float = math.nan

@@ -1,4 +1,4 @@
-"""What a study runs: datasets x techniques x pictures made worse x matchers x lengths x seeds.
+"""What a study runs: datasets x techniques x pictures x what is sent x matchers x lengths x seeds.
 
 A plan is made from a TOML file (`load_plan`) or in Python. It is whole: datasets are found,
 parameters read and ranges checked before anything runs.
@@ -6,7 +6,7 @@ parameters read and ranges checked before anything runs.
 
 import itertools
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -18,6 +18,7 @@ from retraverse.matching.matchers import describe_matcher
 from retraverse.matching.matchers import matcher as matcher_of_name
 from retraverse.techniques import Technique
 from retraverse.techniques import technique as technique_of_name
+from retraverse.techniques.sending import Coding
 
 __all__ = [
     "CHUNK_FRAMES",
@@ -72,6 +73,8 @@ class TechniqueChoice:
     """Empty = the plan's."""
     matchers: tuple[MatcherChoice, ...] = ()
     """Empty = the plan's."""
+    sent: tuple[Coding | None, ...] = ()
+    """Empty = the plan's."""
 
     def at(self, resize: int | None) -> "TechniqueChoice":
         """Return the choice for pictures of one size.
@@ -90,7 +93,7 @@ class TechniqueChoice:
                         "not resized; expected images.resize in the plan, or a number"
                     )
                 parameters[name] = resize
-        return TechniqueChoice(self.name, parameters, self.sequence_lengths, self.matchers)
+        return replace(self, parameters=parameters)
 
     def make(self) -> Technique:
         """Return the technique; ConfigError if a parameter is out of range."""
@@ -124,6 +127,8 @@ class StudyPlan:
     datasets: tuple[Dataset, ...]
     techniques: tuple[TechniqueChoice, ...]
     pairs: tuple[PicturePair, ...] = (PicturePair(),)
+    sent: tuple[Coding | None, ...] = (None,)
+    """What travels to where the map is: the query's descriptors in some coding; None = pictures."""
     matchers: tuple[MatcherChoice, ...] = (MatcherChoice(),)
     sequence_lengths: tuple[SequenceLength, ...] = (1,)
     seeds: tuple[int, ...] = (0,)
@@ -151,10 +156,17 @@ class StudyPlan:
             for length in lengths:
                 yield chosen, length
 
+    def sent_by(self, technique: TechniqueChoice) -> tuple[Coding | None, ...]:
+        """Return what travels where one technique is run; None = pictures."""
+        return technique.sent or self.sent
+
     @property
     def n_runs(self) -> int:
         """How many records the study gives, missing datasets not counted."""
-        per_pair = sum(len(list(self.settings(technique))) for technique in self.techniques)
+        per_pair = sum(
+            len(list(self.settings(technique))) * len(self.sent_by(technique))
+            for technique in self.techniques
+        )
         return len(self.datasets) * len(self.pairs) * per_pair * len(self.seeds)
 
 

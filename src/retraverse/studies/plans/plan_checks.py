@@ -1,10 +1,12 @@
 """What can be wrong between the parts of a plan, each of them sound."""
 
 import itertools
+from contextlib import suppress
 
 from retraverse.datasets.known import Dataset
 from retraverse.errors import InputError, RetraverseError
 from retraverse.studies.plans.plan import CHUNK_FRAMES, PicturePair, StudyPlan
+from retraverse.techniques.sending import coding_label
 
 __all__ = ["PlanError", "plan_problems"]
 
@@ -23,6 +25,7 @@ def plan_problems(plan: StudyPlan) -> list[str]:
     problems = [
         *_technique_problems(plan),
         *_dynamic_problems(plan),
+        *_coding_problems(plan),
         *_picture_problems(plan),
         *(problem for dataset in plan.datasets for problem in _dataset_problems(plan, dataset)),
     ]
@@ -49,6 +52,27 @@ def _dynamic_problems(plan: StudyPlan) -> list[str]:
         for chosen, length in plan.settings(technique)
         if length == "dynamic" and chosen.name != "mean"
     ]
+
+
+def _coding_problems(plan: StudyPlan) -> list[str]:
+    """Return the techniques whose descriptors cannot be sent as the plan says."""
+    problems = []
+    size = next((pair.query.resize for pair in plan.pairs), None)
+    for choice in plan.techniques:
+        with suppress(RetraverseError, TypeError):  # Said of the technique already.
+            dtype = choice.at(size).make().layout.descriptor.dtype
+            wrong = [
+                coding_label(chosen)
+                for chosen in plan.sent_by(choice)
+                if chosen is not None and chosen.is_for_floats and dtype != "float32"
+            ]
+            if wrong:
+                problems.append(
+                    f"technique {choice.name}: got descriptors of {dtype} to be sent as "
+                    f"{', '.join(wrong)}, which code float32 ones; give it sent of its own: "
+                    "pictures, or exact"
+                )
+    return problems
 
 
 def _picture_problems(plan: StudyPlan) -> list[str]:

@@ -9,6 +9,8 @@ The keys (all but ``datasets`` and ``techniques`` may be left out)::
     speeds = ["constant"]              # the query driven again: "varying", "stops", "backwards",
                                        # "detour", "jump"; every dataset at every speed
     techniques = ["cohog", { name = "hog", parameters = { form = "chapter6" } }]
+    sent = ["pictures"]                # or descriptors: "exact", "float16", "int8", "sketch",
+                                       # { name = "projected", parameters = { dimensions = 32 } }
     matchers = ["mean", { name = "seqslam", sequence_lengths = [10] }]
     sequence_lengths = ["1..20", "dynamic"]
     seeds = [0]
@@ -51,6 +53,7 @@ from retraverse.studies.plans.plan import MatcherChoice, PlanOrigin, StudyPlan, 
 from retraverse.studies.plans.plan_checks import PlanError, plan_problems
 from retraverse.studies.plans.plan_pictures import read_pairs
 from retraverse.studies.plans.table_reader import Table, TableReader
+from retraverse.techniques.sending import CODINGS, Coding, coding
 
 __all__ = ["PlanError", "load_plan", "plan_datasets", "read_plan"]
 
@@ -61,6 +64,7 @@ _KEYS = (
     "datasets",
     "speeds",
     "techniques",
+    "sent",
     "matchers",
     "sequence_lengths",
     "seeds",
@@ -71,6 +75,8 @@ _KEYS = (
     "compression",
     "video",
 )
+PICTURES = "pictures"
+"""As what is sent: the query's pictures, which are described where the map is."""
 _LONGEST_LENGTH = 100_000
 
 
@@ -185,6 +191,7 @@ class _Reader(TableReader):
             datasets=self.datasets(),
             techniques=tuple(technique for technique in techniques if technique is not None),
             pairs=read_pairs(self, table, self._root),
+            sent=self._sent(table, [PICTURES]),
             matchers=self._matchers(matchers),
             sequence_lengths=self._lengths("sequence_lengths", table) or (1,),
             seeds=self._seeds(),
@@ -248,14 +255,29 @@ class _Reader(TableReader):
 
     def _technique(self, value: str | Table) -> TechniqueChoice | None:
         table = {"name": value} if isinstance(value, str) else value
-        keys = ("name", "parameters", "sequence_lengths", "matchers")
+        keys = ("name", "parameters", "sequence_lengths", "matchers", "sent")
         self.known_keys("a technique", table, keys)
         return TechniqueChoice(
             self.value("name", table, str, "", "a technique"),
             self.value("parameters", table, dict, {}, "a technique"),
             self._lengths("sequence_lengths", table),
             self._matchers(self.listed("matchers", table, (str, dict), [])),
+            self._sent(table, []),
         )
+
+    def _sent(self, table: Table, default: list[Any]) -> tuple[Coding | None, ...]:
+        """Return what is sent, each once: None = pictures."""
+        found: list[Coding | None] = []
+        for value in self.listed("sent", table, (str, dict), default):
+            chosen = {"name": value} if isinstance(value, str) else value
+            self.known_keys("sent", chosen, ("name", "parameters"))
+            name = self.value("name", chosen, str, PICTURES, "sent")
+            parameters = self.value("parameters", chosen, dict, {}, "sent")
+            if name == PICTURES and not parameters:
+                found.append(None)
+            elif (made := self.attempt(partial(_coding, name, parameters))) is not None:
+                found.append(made)
+        return tuple(dict.fromkeys(found))
 
     def _matchers(self, values: list[Any]) -> tuple[MatcherChoice, ...]:
         return tuple(made for value in values if (made := self._matcher(value)) is not None)
@@ -297,6 +319,12 @@ class _Reader(TableReader):
             if seed < 0:
                 self.problems.append(f"seeds: got {seed}, expected whole numbers from 0")
         return tuple(dict.fromkeys(seeds))
+
+
+def _coding(name: str, parameters: Table) -> Coding:
+    if name not in CODINGS:
+        raise ConfigError(unknown_name("sent", name, [PICTURES, *CODINGS]))
+    return coding(name, **parameters)
 
 
 def _import(module: str) -> None:

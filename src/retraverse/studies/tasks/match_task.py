@@ -41,6 +41,7 @@ from retraverse.studies.tasks.describe_task import TIMES, made_technique, one_li
 from retraverse.studies.tasks.window_answers import Answers, answer_windows, timed_answers
 from retraverse.techniques import Descriptions, Technique
 from retraverse.techniques.handmade.regional_hog import RegionalHog
+from retraverse.techniques.sending import Coding, received
 from retraverse.types import Array, FloatArray
 
 __all__ = [
@@ -104,6 +105,8 @@ class MatchTask:
     """Descriptions of the query, piece by piece; empty where the matrix does."""
     reference: tuple[Source, ...] = ()
     """Descriptions of the map, piece by piece."""
+    sent: Coding | None = None
+    """How the query's descriptors come to where the map is; None = they are made there."""
     query_entropy: tuple[float, ...] = ()
     """Entropy of every query picture, for dynamic lengths; empty where none asks for it."""
 
@@ -177,9 +180,12 @@ class _Pair:
 
     @property
     def queries(self) -> Descriptions:
-        """The query's descriptions, with entropy where it was sent."""
+        """The query's descriptions as they arrive, with entropy where it was sent."""
         if self._queries is None:
             self._queries = _gather(self.task.query).descriptions
+            if self.task.sent is not None:
+                known = self.route.descriptions()
+                self._queries = received(self._queries, known, self.task.sent)
         entropy = self.task.query_entropy
         if entropy and "entropy" not in self._queries.arrays:
             self._queries = with_entropy(self._queries, np.array(entropy))

@@ -6,6 +6,7 @@ how many workers a study runs does not count.
 """
 
 import hashlib
+import itertools
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
@@ -29,6 +30,7 @@ from retraverse.studies.plans.plan import (
 )
 from retraverse.studies.tasks.describe_task import made_technique, one_line_reason
 from retraverse.studies.tasks.match_task import RunSpec, needs_descriptions
+from retraverse.techniques.sending import Coding, coding_label
 from retraverse.types import Progress, no_progress
 
 __all__ = ["CODE", "Chunk", "Drive", "Job", "jobs", "read_drive"]
@@ -107,6 +109,8 @@ class Job:
     """Whether the entropy of the query pictures goes into the records."""
     with_legibility: bool = False
     """Whether what can be read in query pictures goes into the records."""
+    sent: Coding | None = None
+    """How the query's descriptors are sent; None = pictures are."""
     error: tuple[Status, str] | None = None
     """Why it cannot be run at all."""
     _fingerprints: dict[tuple[Worsening, bytes], str] = field(default_factory=dict, repr=False)
@@ -118,7 +122,8 @@ class Job:
             self._pictures(worsening, bytes.fromhex(drive.content_hash))
             for drive, worsening in self.sides
         ]
-        return content_key(CODE, "matrix", self.identity, *sides)
+        coded = () if self.sent is None else ("sent as", self.sent.name, vars(self.sent))
+        return content_key(CODE, "matrix", self.identity, *sides, *coded)
 
     @property
     def sides(self) -> tuple[tuple[Drive, Worsening], tuple[Drive, Worsening]]:
@@ -163,6 +168,10 @@ class Job:
         """Return what its records have in common, before anything is measured."""
         layout = None if self.error else made_technique(self.technique).layout
         pair, truth = self.pair, None if self.error else self.dataset.truth()
+        coded = shared = -1
+        if layout is not None and self.sent is not None:
+            coded = self.sent.n_bytes(layout.descriptor)
+            shared = self.sent.n_shared_bytes(layout.descriptor)
         encoded = [side for side in (pair.query, pair.reference) if side.compression is not None]
         video = pair.query.video
         return RunRecord(
@@ -185,6 +194,9 @@ class Job:
             truth="" if truth is None else truth.description,
             n_queries=len(self.query.traverse),
             n_references=len(self.reference.traverse),
+            descriptor_coding="" if self.sent is None else coding_label(self.sent),
+            coded_bytes=coded,
+            coding_shared_bytes=shared,
             descriptor_bytes=-1 if layout is None else layout.descriptor.n_bytes,
             descriptor_dimension=-1 if layout is None else layout.dimension,
             similarity_key=self.matrix_key,
@@ -201,7 +213,7 @@ def jobs(plan: StudyPlan, dataset: Dataset, query: Drive, reference: Drive) -> I
     truth = _truth_key(dataset.truth())
     fingerprints: dict[tuple[Worsening, bytes], str] = {}
     for choice in plan.techniques:
-        for pair in plan.pairs:
+        for pair, sent in itertools.product(plan.pairs, plan.sent_by(choice)):
             technique = choice.at(pair.query.resize)
             identity, error = _identity(technique)
             job = Job(
@@ -216,6 +228,7 @@ def jobs(plan: StudyPlan, dataset: Dataset, query: Drive, reference: Drive) -> I
                 chapter=plan.chapter,
                 with_entropy=plan.entropy,
                 with_legibility=plan.legibility,
+                sent=sent,
                 error=error,
                 _fingerprints=fingerprints,
             )

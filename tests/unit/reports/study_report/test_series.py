@@ -1,12 +1,13 @@
 """Lines: runs that differ in what was done to their pictures are never on one line and place."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
 import pytest
 from tests.unit.reports.study_report.made_up import make_run
 
-from retraverse.reports.study_report.choices import choices_table
+from retraverse.reports.study_report.choices import choices_table, frame_seconds
 from retraverse.reports.study_report.pictures_only import picture_runs
 from retraverse.reports.study_report.run_files import run_address
 from retraverse.reports.study_report.series import Runs, SeriesBook, is_whole, place_of
@@ -21,7 +22,9 @@ COARSER = make_run(video="h265", video_quality=44, group_length=8)
 LONGER = make_run(video="h265", video_quality=36, group_length=16)
 OTHER_CODEC = make_run(video="av1", video_quality=36, group_length=8)
 PLAIN = make_run()
-ALL = (WHOLE, PART, OTHER_PART, VIDEO, COARSER, LONGER, OTHER_CODEC, PLAIN)
+CODED = make_run(descriptor_coding="int8")
+SKETCHED = make_run(descriptor_coding="sketch(bits=64)")
+ALL = (WHOLE, PART, OTHER_PART, VIDEO, COARSER, LONGER, OTHER_CODEC, PLAIN, CODED, SKETCHED)
 
 
 def labels(runs: Sequence[RunRecord]) -> list[str]:
@@ -36,16 +39,18 @@ def test_no_two_of_them_share_a_line_and_a_place() -> None:
             assert len(runs.at(series, "corridor", place)) == 1
     assert len({run_address(run) for run in ALL}) == len(ALL)
     assert len({place_text(run) for run in ALL}) == len(ALL)
-    assert len(picture_runs(ALL)) == len(ALL)
+    # How descriptors are sent does not change the pictures.
+    assert len(picture_runs(ALL)) == len(ALL) - 2
 
 
 def test_lines_say_what_was_done() -> None:
-    assert labels([WHOLE, PART, VIDEO, LONGER, OTHER_CODEC]) == [
+    assert labels([WHOLE, PART, VIDEO, LONGER, OTHER_CODEC, SKETCHED]) == [
         "hog",
         "hog, grid alone",
         "hog, H.265 in groups of 8",
         "hog, H.265 in groups of 16",
         "hog, AV1 in groups of 8",
+        "hog, sent as sketch(bits=64)",
     ]
     # One quality after the other is one line.
     assert len(set(labels([VIDEO, COARSER]))) == 1
@@ -56,6 +61,7 @@ def test_lines_say_what_was_done() -> None:
     [
         (WHOLE, "c = 97"),
         (PART, "c = 97, grid alone"),
+        (SKETCHED, "sent as sketch(bits=64)"),
         (VIDEO, "query as H.265 crf 36, groups of 8, map as is"),
         (replace(VIDEO, compression_reference=50, resize=256),
          "query as H.265 crf 36, groups of 8, map c = 50, 256 px"),
@@ -72,6 +78,16 @@ def test_only_jpeg_alike_is_uniform() -> None:
     assert not place_of(VIDEO).is_mixed
     assert place_of(make_run(compression=(0, 97))).is_mixed
     assert [run for run in ALL if is_whole(run)] == [WHOLE, PLAIN]
+
+
+def test_descriptors_are_a_choice_by_bytes_and_not_by_time() -> None:
+    coded = make_run(descriptor_coding="sketch", coded_bytes=10, encode_s=1e-6)
+    runs = [replace(run, accuracy=0.97) for run in (coded, WHOLE)]
+    chosen = [row for row in choices_table(runs).rows if not row.absent]
+    by_bytes = [row for row in chosen if "bytes" in row.cells[2].text]
+    assert {row.cells[5].text for row in by_bytes} == {"descriptors, sketch"}
+    assert {row.cells[5].text for row in chosen if row not in by_bytes} == {"97"}
+    assert math.isnan(frame_seconds(coded))
 
 
 def test_one_part_of_jpeg_is_no_choice_and_video_is_one() -> None:

@@ -130,7 +130,12 @@ def test_failed_runs_do_not_count() -> None:
 
 @pytest.mark.parametrize(
     "beyond",
-    [{"jpeg_part": "grid"}, {"video": "av1", "video_quality": 40}, {"chapter": "beyond"}],
+    [
+        {"jpeg_part": "grid"},
+        {"video": "av1", "video_quality": 40},
+        {"descriptor_coding": "int8"},
+        {"chapter": "beyond"},
+    ],
 )
 def test_what_the_thesis_does_not_speak_of_does_not_count(beyond: dict[str, object]) -> None:
     rises = lengths(0.5, 0.6)

@@ -14,6 +14,7 @@ from retraverse.images.quantisation import STANDARD_TABLES
 from retraverse.studies.plans.plan import StudyPlan, TechniqueChoice, compression_pairs
 from retraverse.studies.plans.plan_file import PlanError, load_plan, read_plan
 from retraverse.studies.plans.tables_file import save_tables
+from retraverse.techniques.sending import coding_label
 
 
 @pytest.fixture(scope="module")
@@ -104,6 +105,23 @@ def test_video_is_sent_beside_jpeg_files(data: Path) -> None:
     assert {pair.reference for pair in pairs} == {Worsening(64)}
 
 
+def test_what_is_sent_is_the_plans_or_the_techniques_own(data: Path) -> None:
+    plan = plan_of(
+        data,
+        """
+        techniques = ["hog", { name = "patchnorm", sent = ["exact"] }]
+        sent = ["pictures", "int8", { name = "sketch", parameters = { bits = 64 } }, "int8"]
+        sequence_lengths = [1, 2]
+        """,
+    )
+    names = [
+        [None if one is None else coding_label(one) for one in plan.sent_by(technique)]
+        for technique in plan.techniques
+    ]
+    assert names == [[None, "int8", "sketch(bits=64)"], ["exact"]]
+    assert plan.n_runs == 2 * (3 + 1)
+
+
 def test_a_parameter_follows_the_size_of_the_pictures(data: Path) -> None:
     technique = '{ name = "hog", parameters = { form = "chapter7", resolution = "resized" } }'
     plan = plan_of(data, f"techniques = [{technique}]\nimages = {{ resize = [16, 64] }}")
@@ -192,6 +210,14 @@ def test_a_drive_too_short_for_another_speed(tmp_path: Path) -> None:
         ("video = { h265 = [52] }", "quality of h265: got 52, expected 0 to 51"),
         ("video = { h265 = [30], group = 5 }", "video.group: got 5, expected 1, 2, 4"),
         ("legibility = true", "legibility: got pictures that are not resized"),
+        ('sent = ["int9"]', "unknown sent: got 'int9', expected one of pictures, exact"),
+        ("sent = []", "sent: got nothing, expected at least one"),
+        ('sent = [{ name = "sketch", parameters = { bits = 9 } }]', "bits: got 9, expected a mult"),
+        ('sent = [{ name = "sketch", bits = 8 }]', "unknown key in sent: got 'bits'"),
+        (
+            'techniques = ["patchnorm"]\nsent = ["exact", "int8", "sketch"]',
+            "technique patchnorm: got descriptors of uint8 to be sent as int8, sketch",
+        ),
     ],
 )
 def test_what_can_be_wrong(data: Path, lines: str, problem: str) -> None:

@@ -5,6 +5,7 @@ from retraverse.reports.study_report.chapters.beyond.chosen import compared_matc
 from retraverse.reports.study_report.chapters.beyond.matchers import matcher_means, matcher_tables
 from retraverse.reports.study_report.chapters.beyond.parts import part_artefacts
 from retraverse.reports.study_report.chapters.beyond.reading import CAUTION, reading_artefacts
+from retraverse.reports.study_report.chapters.beyond.sending import sending_artefacts
 from retraverse.reports.study_report.chapters.beyond.speeds import speed_artefacts
 from retraverse.reports.study_report.chapters.beyond.video import video_artefacts
 from retraverse.reports.study_report.chapters.context import ChapterInput
@@ -20,8 +21,8 @@ def beyond(given: ChapterInput) -> Chapter:
         "beyond",
         "Beyond the thesis",
         "Which way of matching a sequence bears compression and changes of speed best, what in "
-        "JPEG hurts, what would video save, and what can still be read in such pictures? The "
-        "thesis names some of this as future work.",
+        "JPEG hurts, what would video save, or descriptors in few bytes, and what can still be "
+        "read in such pictures? The thesis names some of this as future work.",
         sections or free_sections(given),
         given.records,
     )
@@ -49,6 +50,13 @@ def _sections(given: ChapterInput) -> tuple[Section, ...]:
             video_artefacts(given),
             "The query sent as groups of pictures of a video codec, the map as it is: what "
             "consecutive pictures have in common is sent once.",
+        ),
+        Section(
+            "Descriptors in few bytes",
+            sending_artefacts(given),
+            "The thesis sends pictures because descriptors are large: four bytes for each of "
+            "thousands of numbers. Here they are rounded, sketched or projected before they are "
+            "sent; the map keeps its own as they are.",
         ),
         Section("What can still be read?", reading_artefacts(given.records), CAUTION),
     )

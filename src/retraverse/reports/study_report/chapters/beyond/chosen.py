@@ -41,6 +41,7 @@ def setting_of(run: RunRecord) -> Setting:
         video="",
         video_quality=-1,
         group_length=0,
+        descriptor_coding="",
     )
     return Setting(condition, run.sequence_length)
 

@@ -16,8 +16,10 @@ from retraverse.reports.study_report.chapters.beyond.parts import (
     part_columns,
 )
 from retraverse.reports.study_report.chapters.beyond.reading import character_distance
-from retraverse.reports.study_report.chapters.beyond.video import JPEG, VideoCase, video_cases
-from retraverse.reports.study_report.words import length_words, place_text
+from retraverse.reports.study_report.chapters.beyond.sending import sending_cases
+from retraverse.reports.study_report.chapters.beyond.video import JPEG, video_cases
+from retraverse.reports.study_report.chapters.beyond.ways import WayCase, saved_share
+from retraverse.reports.study_report.words import length_words, place_text, size_text
 from retraverse.reports.wording import percent, points
 from retraverse.studies.judging.selection import data_per_answer
 from retraverse.studies.keeping.records import RunRecord
@@ -31,7 +33,7 @@ _ENOUGH = 0.9
 def beyond_findings(records: Sequence[RunRecord]) -> Mapping[str, str]:
     """Return what was found on each dataset; those with nothing to say are left out."""
     found: dict[str, list[str]] = {}
-    for of_question in (_matchers, _speeds, _parts, _videos, _reading):
+    for of_question in (_matchers, _speeds, _parts, _videos, _sending, _reading):
         for dataset, sentence in of_question(records).items():
             found.setdefault(dataset, []).append(sentence)
     return {dataset: _joined(sentences) for dataset, sentences in found.items()}
@@ -128,17 +130,49 @@ def _mean_change(columns: Sequence[PartColumn], part: str) -> float:
 
 
 def _videos(records: Sequence[RunRecord]) -> dict[str, str]:
-    found: dict[str, list[VideoCase]] = {}
-    for case in video_cases(records):
-        found.setdefault(case.dataset, []).append(case)
-    said = {name: _saved_by_video(cases) for name, cases in found.items()}
+    said = {name: _saved_of_jpeg(cases) for name, cases in _cases_by_dataset(video_cases(records))}
     return {name: text for name, text in said.items() if text}
 
 
-def _saved_by_video(cases: Sequence[VideoCase]) -> str:
-    codecs = dict.fromkeys(name for case in cases for name in case.by_codec if name != JPEG)
-    saved = {name: [share for case in cases if (share := _saved(case, name)) is not None]
-             for name in codecs}  # fmt: skip
+def _sending(records: Sequence[RunRecord]) -> dict[str, str]:
+    return {
+        name: _bytes_of_ways(cases) for name, cases in _cases_by_dataset(sending_cases(records))
+    }
+
+
+def _cases_by_dataset(cases: Iterable[WayCase]) -> Iterable[tuple[str, list[WayCase]]]:
+    found: dict[str, list[WayCase]] = {}
+    for case in cases:
+        found.setdefault(case.dataset, []).append(case)
+    return found.items()
+
+
+def _bytes_of_ways(cases: Sequence[WayCase]) -> str:
+    """Return what a window of the longest K weighs in every way, over the techniques."""
+    longest = max((case.length for case in cases), key=lambda length: (len(length), length))
+    here = [case for case in cases if case.length == longest]
+    sizes = {
+        name: [data_per_answer(run) for case in here if (run := case.cheapest(name)) is not None]
+        for name in dict.fromkeys(name for case in here for name in case.by_way)
+    }
+    words = [f"{name} {_span(found)}" for name, found in sizes.items() if found]
+    return (
+        f"a window no worse than with exact descriptors weighs, by technique: {', '.join(words)} "
+        f"(K = {longest})."
+    )
+
+
+def _span(sizes: Sequence[float]) -> str:
+    ends = [size_text(size) for size in (min(sizes), max(sizes))]
+    return ends[0] if len(set(ends)) == 1 else f"{ends[0]} to {ends[1]}"
+
+
+def _saved_of_jpeg(cases: Sequence[WayCase]) -> str:
+    ways = dict.fromkeys(name for case in cases for name in case.by_way if name != JPEG)
+    saved = {
+        name: [share for case in cases if math.isfinite(share := saved_share(case, name, JPEG))]
+        for name in ways
+    }
     words = [
         f"{name} saves {_whole(min(shares))} to {_whole(max(shares))} % of JPEG's bytes"
         for name, shares in saved.items()
@@ -149,13 +183,6 @@ def _saved_by_video(cases: Sequence[VideoCase]) -> str:
 
 def _whole(share: float) -> str:
     return f"{100 * share:.0f}".replace("-", "\u2212")
-
-
-def _saved(case: VideoCase, codec: str) -> float | None:
-    ours, theirs = case.cheapest(codec), case.cheapest(JPEG)
-    if ours is None or theirs is None:
-        return None
-    return 1 - data_per_answer(ours) / data_per_answer(theirs)
 
 
 def _reading(records: Sequence[RunRecord]) -> dict[str, str]:

@@ -78,6 +78,32 @@ def video_runs(dataset: str = "corridor") -> list[RunRecord]:
     ]  # fmt: skip
 
 
+def sending_runs(dataset: str = "corridor") -> list[RunRecord]:
+    """Return one technique: descriptors in codings that are too coarse, and fine enough."""
+    codings = (
+        ("exact", 4000, 0.92),
+        ("int8", 1004, 0.92),
+        ("sketch", 132, 0.88),
+        ("sketch(bits=256)", 36, 0.6),
+        ("projected", 64, 0.7),
+    )
+    return [
+        exact(
+            accuracy,
+            dataset,
+            "hog",
+            length,
+            resize=256,
+            descriptor_coding=name,
+            coded_bytes=n_bytes,
+            query_bytes_mean=9000.0,
+            study="descriptors in few bytes",
+        )
+        for length in ("5", "10")
+        for name, n_bytes, accuracy in codings
+    ]
+
+
 def speed_runs(dataset: str = "corridor") -> list[RunRecord]:
     """Return two techniques with two matchers at c = 0, driven in three ways."""
     return [
@@ -128,6 +154,7 @@ def all_runs(dataset: str = "corridor") -> Sequence[RunRecord]:
         *speed_runs(dataset),
         *part_runs(dataset),
         *video_runs(dataset),
+        *sending_runs(dataset),
         *reading_runs(dataset),
     ]
     return list({run.run_id: run for run in runs}.values())

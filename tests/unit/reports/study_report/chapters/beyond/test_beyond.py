@@ -3,6 +3,7 @@
 import csv
 import io
 import random
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,7 @@ from tests.unit.reports.study_report.chapters.beyond.plans import (
     matcher_runs,
     part_runs,
     reading_runs,
+    sending_runs,
     speed_runs,
     video_runs,
 )
@@ -30,6 +32,7 @@ from retraverse.reports.study_report.chapters.beyond.chosen import (
 from retraverse.reports.study_report.chapters.beyond.found import beyond_findings
 from retraverse.reports.study_report.chapters.beyond.parts import part_columns
 from retraverse.reports.study_report.chapters.beyond.reading import character_distance
+from retraverse.reports.study_report.chapters.beyond.sending import sending_cases
 from retraverse.reports.study_report.chapters.beyond.video import JPEG, video_cases
 from retraverse.studies.keeping.records import RunRecord
 
@@ -38,8 +41,12 @@ SECTIONS = (
     "At changing speed",
     "Which part of JPEG hurts?",
     "Video instead of JPEG",
+    "Descriptors in few bytes",
     "What can still be read?",
 )
+
+
+VIDEO_WAYS = {JPEG, "H.265, groups of 8", "AV1, groups of 8"}
 
 
 @pytest.fixture(scope="module", name="report")
@@ -74,9 +81,10 @@ def test_every_question_has_its_section(report: Path) -> None:
         (speed_runs(), SECTIONS[1]),
         (part_runs(), SECTIONS[2]),
         (video_runs(), SECTIONS[3]),
-        (reading_runs(), SECTIONS[4]),
+        (sending_runs(), SECTIONS[4]),
+        (reading_runs(), SECTIONS[5]),
     ],
-    ids=["matchers", "speeds", "parts", "video", "reading"],
+    ids=["matchers", "speeds", "parts", "video", "sending", "reading"],
 )
 def test_a_plan_alone_has_its_section_alone(
     tmp_path: Path, runs: list[RunRecord], section: str
@@ -96,8 +104,10 @@ def test_runs_are_told_by_what_they_are(seed: int) -> None:
     assert ids(read_settings(runs)) == ids(reading_runs())
     parts = [run for one in part_columns(runs) for run in (one.clean, *one.damaged.values())]
     assert ids(parts) == ids(part_runs())
-    sent = [run for case in video_cases(runs) for of in case.by_codec.values() for run in of]
+    sent = [run for case in video_cases(runs) for of in case.by_way.values() for run in of]
     assert ids(sent) == ids(video_runs())
+    sent = [run for case in sending_cases(runs) for of in case.by_way.values() for run in of]
+    assert ids(sent) == ids([*sending_runs(), *video_runs()])
 
 
 def test_the_page_does_not_depend_on_the_order_of_records(report: Path, tmp_path: Path) -> None:
@@ -132,7 +142,7 @@ def test_parts_of_several_datasets_have_a_mean(report: Path) -> None:
 
 
 def test_video_is_compared_at_equal_accuracy(report: Path) -> None:
-    rows = {row["K"]: row for row in exported(report, "bytes-of-a-window-at-equal-accuracy")}
+    rows = {row["K"]: row for row in exported(report, "bytes-of-a-window-at-equal-accuracy-jpeg")}
     assert list(rows) == ["5", "10"]
     row = rows["10"]
     # 0.90 less half the interval is 0.85: c = 90 and crf 40 are enough, AV1's 0.7 is not.
@@ -144,8 +154,8 @@ def test_video_is_compared_at_equal_accuracy(report: Path) -> None:
 
 
 def test_video_figures_have_a_line_for_each_codec(report: Path) -> None:
-    points = exported(report, "corridor-accuracy-for-the-bytes")
-    assert {row["line"] for row in points} == {JPEG, "H.265, groups of 8", "AV1, groups of 8"}
+    points = exported(report, "corridor-accuracy-for-the-bytes-of-a-window-jpeg")
+    assert {row["line"] for row in points} == VIDEO_WAYS
     cheapest = next(row for row in points if row["line"] == "H.265, groups of 8")
     assert float(cheapest["x"]) == pytest.approx(2.5)  # 5 pictures of 500 bytes
     page = Page((report / "beyond.html").read_text())
@@ -153,10 +163,43 @@ def test_video_figures_have_a_line_for_each_codec(report: Path) -> None:
     assert any(panel.get("data-technique") == "hog" for panel in panels)
 
 
+def test_descriptors_are_compared_with_pictures(report: Path) -> None:
+    rows = {
+        row["K"]: row for row in exported(report, "bytes-of-a-window-at-equal-accuracy-descriptors")
+    }
+    assert list(rows) == ["5", "10"]
+    row = rows["10"]
+    # 0.92 less half the interval is 0.87: int8 and the long sketch are enough, and JPEG at c = 0.
+    assert float(row["Accuracy, exact descriptors"]) == pytest.approx(0.92)
+    assert float(row["exact: bytes"]) == pytest.approx(40_000)
+    assert float(row["int8: bytes"]) == pytest.approx(10_040)
+    assert float(row["sketch: bytes"]) == pytest.approx(1320)
+    assert float(row["sketch: saved"]) == pytest.approx(1 - 0.033)
+    assert row["projected: bytes"] == "none"
+    assert float(row["JPEG: bytes"]) == pytest.approx(100_000)
+    assert float(row["JPEG: saved"]) == pytest.approx(1 - 2.5)
+    lines = {
+        row["line"]
+        for row in exported(report, "corridor-accuracy-for-the-bytes-of-a-window-descriptors")
+    }
+    assert lines == {"exact", "int8", "sketch", "projected", *VIDEO_WAYS}
+
+
+def test_descriptors_of_compressed_pictures_are_not_compared() -> None:
+    damaged = [replace(run, compression_query=50) for run in sending_runs()]
+    assert sending_cases(damaged) == []
+
+
+def test_codings_are_found_by_their_bytes() -> None:
+    said = beyond_findings([*sending_runs(), *video_runs()])["corridor"]
+    assert "weighs, by technique: exact 40.0 kB, " in said.replace("\u202f", " ")
+    assert "sketch 1.32 kB" in said.replace("\u202f", " ")
+
+
 def test_jpeg_of_another_map_is_no_rival_of_video() -> None:
     others = [make_run(length="10", resize=256, compression=(c, c)) for c in (0, 99)]
     found = video_cases([*video_runs(), *others])
-    assert ids([run for case in found for run in case.by_codec[JPEG]]).isdisjoint(ids(others))
+    assert ids([run for case in found for run in case.by_way[JPEG]]).isdisjoint(ids(others))
     assert video_cases([run for run in video_runs() if run.video]) == []
 
 

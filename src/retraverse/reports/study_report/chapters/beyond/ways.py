@@ -1,0 +1,212 @@
+"""Ways of sending what a place is recognised by, compared at equal accuracy.
+
+The same query, technique and K with everything else alike, once as JPEG files, once as groups of a
+video codec, once as descriptors in some coding: what does a window weigh?
+"""
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from retraverse.reports.study_report.artefacts import Cell, Figure, Line, Panel, Table
+from retraverse.reports.study_report.chapters.beyond.chosen import settings_with
+from retraverse.reports.study_report.chapters.context import ChapterInput, long_table
+from retraverse.reports.study_report.chapters.data_of_answers import frontier
+from retraverse.reports.study_report.choices import cheapest
+from retraverse.reports.study_report.figures import PERCENT
+from retraverse.reports.study_report.panels import draw_lines
+from retraverse.reports.study_report.series import Runs, Series, SeriesBook
+from retraverse.reports.study_report.words import (
+    dataset_title,
+    meanings,
+    measured_on,
+    sent_text,
+    size_text,
+)
+from retraverse.reports.wording import NOTHING
+from retraverse.studies.judging.selection import data_per_answer
+from retraverse.studies.keeping.records import RunRecord
+
+__all__ = ["WayCase", "saved_share", "way_cases", "ways_figures", "ways_table"]
+
+
+@dataclass(frozen=True)
+class WayCase:
+    """One technique with one K on one dataset, its query sent in every way."""
+
+    series: Series
+    dataset: str
+    length: str
+    base: str
+    """The way that the others are measured against."""
+    by_way: Mapping[str, Sequence[RunRecord]]
+    """The base first."""
+
+    @property
+    def finest(self) -> RunRecord:
+        """Return the run of the base that sends most."""
+        return max(self.by_way[self.base], key=data_per_answer)
+
+    def cheapest(self, way: str) -> RunRecord | None:
+        """Return the run of fewest bytes that is not shown to be worse than the finest."""
+        return cheapest(self.by_way.get(way, ()), self.finest.accuracy_low, data_per_answer)
+
+
+def way_cases(
+    records: Iterable[RunRecord],
+    base: str,
+    ways: Callable[[RunRecord], str],
+    is_wanted: Callable[[RunRecord], bool],
+) -> list[WayCase]:
+    """Return what there is to compare: settings with runs of the base and of others.
+
+    Parameters
+    ----------
+    records : iterable of RunRecord
+    base : str
+        The way that the others are measured against.
+    ways : callable
+        The name of the way a run's query was sent, "" for one that is not compared. Runs of other
+        ways count if their map is that of one of these.
+    is_wanted : callable
+        Says whether a run makes its setting worth comparing.
+    """
+    groups = settings_with(records, is_wanted)
+    plain = [
+        replace(run, video="", group_length=0, encoder="", descriptor_coding="")
+        for runs in groups.values()
+        for run in runs
+    ]
+    named = Runs(plain, SeriesBook({}))
+    cases = []
+    for runs in groups.values():
+        maps = {run.compression_reference for run in runs if is_wanted(run)}
+        by_way: dict[str, list[RunRecord]] = {base: []}
+        for run in sorted(runs, key=lambda run: (ways(run), -data_per_answer(run))):
+            if run.compression_reference in maps and ways(run):
+                by_way.setdefault(ways(run), []).append(run)
+        if by_way[base] and len(by_way) > 1:
+            first = runs[0]
+            series = named.series_of(first)
+            cases.append(WayCase(series, first.dataset, first.sequence_length, base, by_way))
+    return cases
+
+
+def saved_share(case: WayCase, way: str, against: str) -> float:
+    """Return 1 - bytes / bytes of two ways at equal accuracy; NaN if one of them has none."""
+    ours, theirs = (_data(case.cheapest(name)) for name in (way, against))
+    return 1 - ours / theirs if theirs > 0 else math.nan
+
+
+def _data(run: RunRecord | None) -> float:
+    return math.nan if run is None else data_per_answer(run)
+
+
+def ways_figures(cases: Sequence[WayCase], title: str) -> tuple[Figure, ...]:
+    """Return a figure for each dataset, accuracy over the bytes of a window: a line for each way.
+
+    Parameters
+    ----------
+    cases : sequence of WayCase
+    title : str
+        What follows the dataset's name.
+    """
+    book = SeriesBook({})
+    for name in _ways_of(cases):
+        book.get(name, "")
+    datasets = dict.fromkeys(case.dataset for case in cases)
+    return tuple(
+        _figure([case for case in cases if case.dataset == one], book, title) for one in datasets
+    )
+
+
+def _ways_of(cases: Sequence[WayCase]) -> list[str]:
+    return list(dict.fromkeys(name for case in cases for name in case.by_way))
+
+
+def _figure(cases: Sequence[WayCase], book: SeriesBook, title: str) -> Figure:
+    by_technique: dict[Series, list[WayCase]] = {}
+    for case in cases:
+        by_technique.setdefault(case.series, []).append(case)
+    return Figure(
+        "",
+        f"{dataset_title(cases[0].dataset)}: {title}",
+        tuple(_panel(series, some, book) for series, some in sorted(by_technique.items())),
+        "Every setting and K that no cheaper one of the same way beats. Higher and further to the "
+        "left is better.",
+        meanings("accuracy", "group bytes", "K"),
+    )
+
+
+def _panel(series: Series, cases: Sequence[WayCase], book: SeriesBook) -> Panel:
+    lines = []
+    for way in _ways_of(cases):
+        found = frontier(
+            (data_per_answer(run) / 1000, 100 * run.accuracy, run)
+            for case in cases
+            for run in case.by_way.get(way, ())
+        )
+        x, y, runs = zip(*found, strict=True) if found else ((), (), ())
+        lines.append(Line(book.get(way, ""), x, y, runs))
+    drawn = draw_lines(
+        series.label,
+        measured_on(cases[0].finest),
+        lines,
+        name=f"{cases[0].base} {cases[0].dataset}",
+        x_label="Bytes of a window, kB",
+        y_label="Accuracy, %",
+        is_log=(True, False),
+        y_limits=PERCENT,
+    )
+    return replace(drawn, technique=series.technique)
+
+
+def ways_table(
+    given: ChapterInput, cases: Sequence[WayCase], title: str, caption: str, finest: str
+) -> Table:
+    """Return what a window weighs in every way, at an accuracy not shown to be worse.
+
+    Parameters
+    ----------
+    given : ChapterInput
+    cases : sequence of WayCase
+    title, caption : str
+    finest : str
+        What the finest run of the base is called.
+    """
+    ways = _ways_of(cases)
+    return long_table(
+        given,
+        [(case.series, case.finest, _cells(case, ways)) for case in cases],
+        number="",
+        title=title,
+        head=(
+            "K",
+            f"Accuracy, {finest}",
+            *(f"{name}: bytes" for name in ways),
+            *(f"{name}: saved" for name in ways[1:]),
+        ),
+        caption=caption,
+        definitions=meanings("accuracy", "interval", "group bytes", "K", "c"),
+    )
+
+
+def _cells(case: WayCase, ways: Sequence[str]) -> tuple[Cell, ...]:
+    finest = case.finest
+    interval = f"({100 * finest.accuracy_low:.0f} to {100 * finest.accuracy_high:.0f})"
+    return (
+        Cell(case.length, finest.mean_sequence_length),
+        Cell(f"{100 * finest.accuracy:.1f} %", finest.accuracy, finest, note=interval),
+        *(_bytes(case.cheapest(name)) for name in ways),
+        *(_saved(saved_share(case, name, case.base)) for name in ways[1:]),
+    )
+
+
+def _bytes(run: RunRecord | None) -> Cell:
+    if run is None:
+        return Cell("none", math.inf)
+    return Cell(size_text(data_per_answer(run)), data_per_answer(run), run, note=sent_text(run))
+
+
+def _saved(share: float) -> Cell:
+    return Cell(NOTHING, math.nan) if math.isnan(share) else Cell(f"{100 * share:,.0f} %", share)
