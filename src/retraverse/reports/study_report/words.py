@@ -129,9 +129,9 @@ def damage_text(record: RunRecord) -> str:
 
 
 def sent_text(record: RunRecord) -> str:
-    """Return how a query frame was sent: "c = 95", "crf 36", "sketch(bits=256)"."""
+    """Return how a query frame was sent: "c = 95", "crf 36", "36 a frame"."""
     if record.descriptor_coding:
-        return record.descriptor_coding
+        return f"{record.coded_bytes:,} a frame"
     if record.video:
         return f"crf {record.video_quality}"
     return f"c = {compression_text(record.compression_query)}"

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from retraverse.reports.study_report.artefacts import Artefact
 from retraverse.reports.study_report.chapters.beyond.video import way_of_pictures
 from retraverse.reports.study_report.chapters.beyond.ways import (
+    Way,
     WayCase,
     way_cases,
     ways_figures,
@@ -12,6 +13,7 @@ from retraverse.reports.study_report.chapters.beyond.ways import (
 )
 from retraverse.reports.study_report.chapters.context import ChapterInput
 from retraverse.studies.keeping.records import RunRecord
+from retraverse.techniques.sending import CODINGS
 
 __all__ = ["EXACT", "sending_artefacts", "sending_cases"]
 
@@ -27,10 +29,14 @@ def sending_cases(records: Iterable[RunRecord]) -> list[WayCase]:
     return way_cases(records, EXACT, _way_of, lambda run: bool(run.descriptor_coding))
 
 
-def _way_of(run: RunRecord) -> str:
+def _way_of(run: RunRecord) -> Way:
     """Return how the query was sent: the coding without its parameters, or the pictures' way."""
+    known = list(CODINGS)
     name = run.descriptor_coding.partition("(")[0]
-    return name if name and not _is_damaged(run) else way_of_pictures(run)
+    if not name or _is_damaged(run):
+        rank, picture_way = way_of_pictures(run)
+        return Way(len(known) + 1 + rank, picture_way)
+    return Way(known.index(name) if name in known else len(known), name)
 
 
 def _is_damaged(run: RunRecord) -> bool:
@@ -48,9 +54,10 @@ def sending_artefacts(given: ChapterInput) -> tuple[Artefact, ...]:
         cases,
         "Bytes of a window at equal accuracy, descriptors and pictures",
         "The fewest bytes with an accuracy of at least the lower end of the interval of exact "
-        "descriptors (four bytes a number, CoHOG's one); beside it how. “sketch” needs nothing but "
-        "a seed; “projected” needs the map's directions at the sender first, which are not in "
-        "these bytes. Pictures need neither, serve any technique, and can be looked at.",
+        "descriptors; beside it the bytes of a frame, JPEG's c or the video's crf. Exact "
+        "descriptors take four bytes a number, CoHOG's one. “sketch” needs nothing but a seed; "
+        "“projected” needs the map's directions at the sender first, which are not in these bytes. "
+        "Pictures need neither, serve any technique, and can be looked at.",
         "exact descriptors",
     )
     return table, *ways_figures(cases, "accuracy for the bytes of a window, descriptors, pictures")

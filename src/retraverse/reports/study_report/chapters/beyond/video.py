@@ -2,8 +2,10 @@
 
 from collections.abc import Iterable
 
+from retraverse.images.codecs import GROUP_CODECS
 from retraverse.reports.study_report.artefacts import Artefact
 from retraverse.reports.study_report.chapters.beyond.ways import (
+    Way,
     WayCase,
     way_cases,
     ways_figures,
@@ -26,13 +28,15 @@ def video_cases(records: Iterable[RunRecord]) -> list[WayCase]:
     return way_cases(records, JPEG, way_of_pictures, lambda run: bool(run.video))
 
 
-def way_of_pictures(run: RunRecord) -> str:
-    """Return how the query's pictures were sent, "" if nobody would send them, or none were."""
+def way_of_pictures(run: RunRecord) -> Way:
+    """Return how the query's pictures were sent; "" if nobody would send them, or none were."""
     if run.descriptor_coding or run.jpeg_part:
-        return ""
+        return Way(0, "")
     if run.video:
-        return f"{codec_title(run.video)}, groups of {run.group_length}"
-    return JPEG if run.compression_query >= 0 else ""
+        known = list(GROUP_CODECS)
+        rank = known.index(run.video) if run.video in known else len(known)
+        return Way(1 + rank, f"{codec_title(run.video)}, groups of {run.group_length}")
+    return Way(0, JPEG if run.compression_query >= 0 else "")
 
 
 def video_artefacts(given: ChapterInput) -> tuple[Artefact, ...]:
@@ -48,5 +52,6 @@ def video_artefacts(given: ChapterInput) -> tuple[Artefact, ...]:
         "JPEG files; beside it the c of JPEG or the crf of the video. The map is as it is. A group "
         "can only be sent when its last picture is there.",
         "finest JPEG",
+        with_saved=True,
     )
     return table, *ways_figures(cases, "accuracy for the bytes of a window, JPEG and video")

@@ -7,6 +7,7 @@ video codec, once as descriptors in some coding: what does a window weigh?
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from retraverse.reports.study_report.artefacts import Cell, Figure, Line, Panel, Table
 from retraverse.reports.study_report.chapters.beyond.chosen import settings_with
@@ -27,7 +28,16 @@ from retraverse.reports.wording import NOTHING
 from retraverse.studies.judging.selection import data_per_answer
 from retraverse.studies.keeping.records import RunRecord
 
-__all__ = ["WayCase", "saved_share", "way_cases", "ways_figures", "ways_table"]
+__all__ = ["Way", "WayCase", "saved_share", "way_cases", "ways_figures", "ways_table"]
+
+
+class Way(NamedTuple):
+    """How the query of a run was sent."""
+
+    rank: int
+    """Of its kind in tables, the base's 0."""
+    name: str
+    """ "" = in no way that is compared."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +65,7 @@ class WayCase:
 def way_cases(
     records: Iterable[RunRecord],
     base: str,
-    ways: Callable[[RunRecord], str],
+    way_of: Callable[[RunRecord], Way],
     is_wanted: Callable[[RunRecord], bool],
 ) -> list[WayCase]:
     """Return what there is to compare: settings with runs of the base and of others.
@@ -65,11 +75,11 @@ def way_cases(
     records : iterable of RunRecord
     base : str
         The way that the others are measured against.
-    ways : callable
-        The name of the way a run's query was sent, "" for one that is not compared. Runs of other
-        ways count if their map is that of one of these.
+    way_of : callable
+        How a run's query was sent.
     is_wanted : callable
-        Says whether a run makes its setting worth comparing.
+        Says whether a run makes its setting worth comparing. Runs of other ways count if their map
+        is that of one of these.
     """
     groups = settings_with(records, is_wanted)
     plain = [
@@ -82,9 +92,9 @@ def way_cases(
     for runs in groups.values():
         maps = {run.compression_reference for run in runs if is_wanted(run)}
         by_way: dict[str, list[RunRecord]] = {base: []}
-        for run in sorted(runs, key=lambda run: (ways(run), -data_per_answer(run))):
-            if run.compression_reference in maps and ways(run):
-                by_way.setdefault(ways(run), []).append(run)
+        for run in sorted(runs, key=lambda run: (way_of(run), -data_per_answer(run))):
+            if run.compression_reference in maps and (name := way_of(run).name):
+                by_way.setdefault(name, []).append(run)
         if by_way[base] and len(by_way) > 1:
             first = runs[0]
             series = named.series_of(first)
@@ -121,7 +131,9 @@ def ways_figures(cases: Sequence[WayCase], title: str) -> tuple[Figure, ...]:
 
 
 def _ways_of(cases: Sequence[WayCase]) -> list[str]:
-    return list(dict.fromkeys(name for case in cases for name in case.by_way))
+    """Return the names of all ways, in the order of the cases that have most of them."""
+    fullest = sorted(cases, key=lambda case: -len(case.by_way))
+    return list(dict.fromkeys(name for case in fullest for name in case.by_way))
 
 
 def _figure(cases: Sequence[WayCase], book: SeriesBook, title: str) -> Figure:
@@ -162,7 +174,13 @@ def _panel(series: Series, cases: Sequence[WayCase], book: SeriesBook) -> Panel:
 
 
 def ways_table(
-    given: ChapterInput, cases: Sequence[WayCase], title: str, caption: str, finest: str
+    given: ChapterInput,
+    cases: Sequence[WayCase],
+    title: str,
+    caption: str,
+    finest: str,
+    *,
+    with_saved: bool = False,
 ) -> Table:
     """Return what a window weighs in every way, at an accuracy not shown to be worse.
 
@@ -173,36 +191,42 @@ def ways_table(
     title, caption : str
     finest : str
         What the finest run of the base is called.
+    with_saved : bool
+        Whether the share of the base's bytes that others save has columns of its own.
     """
     ways = _ways_of(cases)
+    others = ways[1:] if with_saved else []
     return long_table(
         given,
-        [(case.series, case.finest, _cells(case, ways)) for case in cases],
+        [(case.series, case.finest, _cells(case, ways, others)) for case in cases],
         number="",
         title=title,
         head=(
             "K",
             f"Accuracy, {finest}",
             *(f"{name}: bytes" for name in ways),
-            *(f"{name}: saved" for name in ways[1:]),
+            *(f"{name}: saved" for name in others),
         ),
         caption=caption,
         definitions=meanings("accuracy", "interval", "group bytes", "K", "c"),
     )
 
 
-def _cells(case: WayCase, ways: Sequence[str]) -> tuple[Cell, ...]:
+def _cells(case: WayCase, ways: Sequence[str], others: Sequence[str]) -> tuple[Cell, ...]:
     finest = case.finest
     interval = f"({100 * finest.accuracy_low:.0f} to {100 * finest.accuracy_high:.0f})"
     return (
         Cell(case.length, finest.mean_sequence_length),
         Cell(f"{100 * finest.accuracy:.1f} %", finest.accuracy, finest, note=interval),
-        *(_bytes(case.cheapest(name)) for name in ways),
-        *(_saved(saved_share(case, name, case.base)) for name in ways[1:]),
+        *(_bytes(case, name) for name in ways),
+        *(_saved(saved_share(case, name, case.base)) for name in others),
     )
 
 
-def _bytes(run: RunRecord | None) -> Cell:
+def _bytes(case: WayCase, way: str) -> Cell:
+    if way not in case.by_way:
+        return Cell(NOTHING, math.nan)
+    run = case.cheapest(way)
     if run is None:
         return Cell("none", math.inf)
     return Cell(size_text(data_per_answer(run)), data_per_answer(run), run, note=sent_text(run))

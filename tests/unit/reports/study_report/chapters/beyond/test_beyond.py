@@ -46,7 +46,7 @@ SECTIONS = (
 )
 
 
-VIDEO_WAYS = {JPEG, "H.265, groups of 8", "AV1, groups of 8"}
+VIDEO_WAYS = (JPEG, "H.265, groups of 8", "AV1, groups of 8")
 
 
 @pytest.fixture(scope="module", name="report")
@@ -155,7 +155,7 @@ def test_video_is_compared_at_equal_accuracy(report: Path) -> None:
 
 def test_video_figures_have_a_line_for_each_codec(report: Path) -> None:
     points = exported(report, "corridor-accuracy-for-the-bytes-of-a-window-jpeg")
-    assert {row["line"] for row in points} == VIDEO_WAYS
+    assert {row["line"] for row in points} == set(VIDEO_WAYS)
     cheapest = next(row for row in points if row["line"] == "H.265, groups of 8")
     assert float(cheapest["x"]) == pytest.approx(2.5)  # 5 pictures of 500 bytes
     page = Page((report / "beyond.html").read_text())
@@ -174,10 +174,12 @@ def test_descriptors_are_compared_with_pictures(report: Path) -> None:
     assert float(row["exact: bytes"]) == pytest.approx(40_000)
     assert float(row["int8: bytes"]) == pytest.approx(10_040)
     assert float(row["sketch: bytes"]) == pytest.approx(1320)
-    assert float(row["sketch: saved"]) == pytest.approx(1 - 0.033)
     assert row["projected: bytes"] == "none"
     assert float(row["JPEG: bytes"]) == pytest.approx(100_000)
-    assert float(row["JPEG: saved"]) == pytest.approx(1 - 2.5)
+    assert list(row)[3:] == [
+        "Accuracy, exact descriptors",
+        *(f"{name}: bytes" for name in ("exact", "int8", "sketch", "projected", *VIDEO_WAYS)),
+    ]
     lines = {
         row["line"]
         for row in exported(report, "corridor-accuracy-for-the-bytes-of-a-window-descriptors")
