@@ -88,9 +88,19 @@ def choices_table(records: Sequence[RunRecord]) -> Table:
         "The cheapest of all runs that reaches the accuracy; a click opens it. Being the best of "
         "many flatters a run: its 95 % interval says how sure its accuracy is (100 to 100: no "
         "window was wrong, which says little of few windows). Few candidates "
-        "left (long windows on short drives) make a right answer easy.",
+        f"left (long windows on short drives) make a right answer easy.{_of_descriptors(measured)}",
         meanings("window bytes", "time of a frame", "accuracy", "interval", "K", "c", "candidates"),
         lead=4,
+    )
+
+
+def _of_descriptors(runs: Sequence[RunRecord]) -> str:
+    """Return what is to be known of those that send descriptors."""
+    if not any(run.coding_shared_bytes > 0 for run in runs):
+        return ""
+    return (
+        " Where descriptors are sent they are made by the sender; “projected” ones need what the "
+        "run calls “known before” there first."
     )
 
 

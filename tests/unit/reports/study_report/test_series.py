@@ -88,6 +88,10 @@ def test_descriptors_are_a_choice_by_bytes_and_not_by_time() -> None:
     assert {row.cells[5].text for row in by_bytes} == {"descriptors, sketch"}
     assert {row.cells[5].text for row in chosen if row not in by_bytes} == {"97"}
     assert math.isnan(frame_seconds(coded))
+    # What must be known before is said where anything must.
+    assert "known before" not in choices_table(runs).caption
+    learned = [replace(run, coding_shared_bytes=9) for run in runs]
+    assert "known before" in choices_table(learned).caption
 
 
 def test_one_part_of_jpeg_is_no_choice_and_video_is_one() -> None:
