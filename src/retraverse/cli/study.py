@@ -177,13 +177,13 @@ def _line(record: "RunRecord") -> tuple[Any, ...]:
     """Return a record as a row of a table."""
     brief = _brief(record)
     shown = f"{record.accuracy:.3f} ({record.accuracy_low:.2f}-{record.accuracy_high:.2f})"
+    brief["c"] = f"{brief['c']} {brief['part']}".strip()
     names = ("dataset", "technique", "matcher", "K", "c", "resize", "sent as")
     return (*(brief[name] for name in names), shown, brief["AUC"], brief["status"])
 
 
 def _brief(record: "RunRecord") -> dict[str, Any]:
     """Return the columns a person looks at first."""
-    from retraverse.reports.study_report.words import damage_text
     from retraverse.studies.judging.selection import bytes_sent
 
     is_ok = record.status == "ok"
@@ -194,16 +194,26 @@ def _brief(record: "RunRecord") -> dict[str, Any]:
         "matcher": record.matcher,
         "K": record.sequence_length,
         "c": "/".join("none" if side < 0 else str(side) for side in sides),
+        "part": record.jpeg_part,
         "resize": record.resize or "none",
         "accuracy": round(record.accuracy, 3),
         "low": round(record.accuracy_low, 3),
         "high": round(record.accuracy_high, 3),
         "AUC": round(record.auc, 3),
-        "sent as": record.descriptor_coding or damage_text(record) or "pictures",
+        "sent as": _sent(record),
         "bytes": round(bytes_sent(record)) if is_ok else bytes_sent(record),
         "t_VPR ms": round(record.vpr_s * 1e3, 3),
         "status": record.status if is_ok else f"{record.status}: {record.error}",
     }
+
+
+def _sent(record: "RunRecord") -> str:
+    """Return what travelled: "pictures", "H.265 crf 36, groups of 8", "pictures as int8"."""
+    from retraverse.reports.study_report.words import damage_text
+
+    pictures = damage_text(record) if record.video else "pictures"
+    coding = record.descriptor_coding
+    return f"descriptors of {pictures}, {coding}" if coding else pictures
 
 
 def _print_reasons(out: Path) -> None:

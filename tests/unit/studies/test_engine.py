@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from tests.unit.studies.tiny import hashes, tiny_plan, tiny_registered, write_dataset
@@ -17,6 +18,7 @@ from retraverse.images.bare_jpeg import TableSet, strip_tables
 from retraverse.images.codecs import encode_group
 from retraverse.images.worsen import frame_bytes, worsened
 from retraverse.images.worsening import Worsening
+from retraverse.matching.match_traverse import match_windows, query_windows
 from retraverse.matching.pairwise import describe_query
 from retraverse.metrics import evaluate
 from retraverse.studies.engine import run_study
@@ -113,7 +115,9 @@ def test_what_is_sent_as_by_hand(data: Path, tmp_path: Path) -> None:
     kinds = {"": None, "exact": None, "projected(dimensions=2)": coding("projected", dimensions=2)}
     for (label, length), record in records.items():
         chosen = kinds[label]
-        arrived = seen if chosen is None else received(seen, route.descriptions(), chosen)
+        arrived = seen
+        if chosen is not None:
+            arrived = received(seen, route.descriptions(), chosen).descriptions
         expected = rt.match(arrived, route, sequence_length=int(length))
         assert record.answer_reference == tuple(expected.reference)
         assert record.descriptor_bytes == 4 * 36
@@ -134,11 +138,13 @@ def test_who_asks_for_codings_later_repeats_nothing(data: Path, tmp_path: Path) 
     assert (second.n_kept, second.n_ok, second.n_described) == (first.n_ok, first.n_ok, 0)
 
 
-def test_dynamic_windows_see_what_arrives(data: Path, tmp_path: Path) -> None:
+def test_windows_are_as_long_as_who_drives_finds(data: Path, tmp_path: Path) -> None:
+    """A sketch of few bits makes all frames unlike; the lengths are found before it is made."""
+    coarse = '{ name = "sketch", parameters = { bits = 64 } }'
     plan = tiny_plan(
         data,
         techniques='[{ name = "convsequential", parameters = { resolution = 64 } }]',
-        sent='["int8"]',
+        sent=f'["pictures", {coarse}]',
         sequence_lengths='["dynamic"]',
         compression='{ levels = ["none"] }',
         modules="[]",
@@ -147,11 +153,39 @@ def test_dynamic_windows_see_what_arrives(data: Path, tmp_path: Path) -> None:
     (dataset,) = plan.datasets
     route = rt.build_map(dataset.reference(), rt.technique("convsequential", resolution=64))
     seen = describe_query(dataset.query(), route)
-    arrived = received(seen, route.descriptions(), coding("int8"))
-    (record,) = _records(tmp_path)
-    expected = rt.match(arrived, route, sequence_length="dynamic")
-    assert record.answer_reference == tuple(expected.reference)
-    assert record.answer_score == pytest.approx(expected.score)
+    arrived = received(seen, route.descriptions(), coding("sketch", bits=64)).descriptions
+    lengths = query_windows(seen, route, "dynamic")
+    assert query_windows(arrived, route, "dynamic").tolist() != lengths.tolist()
+    (expected,) = match_windows(arrived, route, [lengths])
+    by_coding = {record.descriptor_coding: record for record in _records(tmp_path)}
+    coded = by_coding["sketch(bits=64)"]
+    assert coded.answer_reference == tuple(expected.reference)
+    assert coded.answer_score == pytest.approx(expected.score, rel=1e-5)
+    assert coded.sequence_lengths == by_coding[""].sequence_lengths == tuple(lengths)
+    # The entropies of regions and picture go along as they are, beside length and bits.
+    others = sum(spec.n_bytes for spec in route.technique.layout.arrays.values())
+    others -= route.technique.layout.descriptor.n_bytes
+    assert others > 0
+    assert coded.coded_bytes == 4 + 64 // 8 + others
+    assert coded.vpr_s > coded.encode_s * coded.mean_sequence_length + coded.match_s
+
+
+def test_frames_without_a_descriptor_send_none(tmp_path: Path) -> None:
+    folder = write_dataset(tmp_path / "data" / "noise", n_frames=40)
+    for number in range(10):
+        cv2.imwrite(str(folder / "query" / f"{number:03d}.png"), np.zeros((24, 32), np.uint8))
+    plan = tiny_plan(
+        tmp_path / "data",
+        sent='["pictures", "int8", "projected"]',
+        sequence_lengths="[1]",
+        compression='{ levels = ["none"] }',
+    )
+    run_study(plan, tmp_path / "study", workers=0)
+    for record in _records(tmp_path):
+        assert record.no_descriptor_share == 0.25
+        assert record.answer_reference[:10] == (-1,) * 10
+        if record.descriptor_coding:
+            assert data_per_answer(record) == pytest.approx(0.75 * record.coded_bytes)
 
 
 def _records(folder: Path) -> tuple[RunRecord, ...]:

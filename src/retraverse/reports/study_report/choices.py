@@ -42,11 +42,11 @@ _HEAD = (
 
 
 def frame_seconds(record: RunRecord) -> float:
-    """Return t_e + t_m: the work for every new picture once the robot is under way, seconds.
+    """Return the work for every new picture once the robot is under way, seconds.
 
-    NaN where descriptors are sent: two machines share that work, and coding is not in it.
+    t_e + t_m, and where its descriptor is sent what coding it takes; two machines share that.
     """
-    return math.nan if record.descriptor_coding else record.encode_s + record.match_s
+    return record.encode_s + record.match_s + (record.coding_s if record.descriptor_coding else 0)
 
 
 def cheapest(
@@ -99,9 +99,14 @@ def _of_descriptors(runs: Sequence[RunRecord]) -> str:
     if not any(run.coding_shared_bytes > 0 for run in runs):
         return ""
     return (
-        " Where descriptors are sent they are made by the sender; “projected” ones need what the "
-        "run calls “known before” there first."
+        " Descriptors are made by who sends them; what must be there before the first is not in "
+        "the bytes of a window, and stands beside them."
     )
+
+
+def _known_before(run: RunRecord) -> str:
+    shared = run.coding_shared_bytes
+    return f"and {size_text(shared)} before" if shared > 0 else ""
 
 
 def _can_be_chosen(run: RunRecord) -> bool:
@@ -109,9 +114,17 @@ def _can_be_chosen(run: RunRecord) -> bool:
     return run.status == "ok" and not run.jpeg_part and recorded_name(run.dataset)[1] == "constant"
 
 
+def _alone_seconds(run: RunRecord) -> float:
+    """Return the time of a frame; NaN where descriptors are coded.
+
+    Who looks for the least time has the map at hand and sends nothing.
+    """
+    return math.nan if run.descriptor_coding else frame_seconds(run)
+
+
 _COSTS: tuple[tuple[str, Callable[[RunRecord], float]], ...] = (
     ("bytes", data_per_answer),
-    ("time", frame_seconds),
+    ("time", _alone_seconds),
 )
 
 
@@ -157,7 +170,7 @@ def _cells(runs: Runs, run: RunRecord) -> tuple[Cell, ...]:
             note=" ".join(run.encoder.split()[2:]),
         ),
         Cell(f"{run.resize} px" if run.resize else "as is", float(run.resize or math.inf)),
-        Cell(size_text(data), data),
+        Cell(size_text(data), data, note=_known_before(run)),
         Cell(seconds(time), time),
         Cell(
             percent(run.accuracy),
@@ -174,11 +187,11 @@ def _cells(runs: Runs, run: RunRecord) -> tuple[Cell, ...]:
 
 def _compressions(run: RunRecord) -> str:
     query, reference = run.compression_query, run.compression_reference
-    if run.descriptor_coding:
-        return f"descriptors, {run.descriptor_coding}"
     if run.video:
         # That its pictures come in groups, and what the map is, says the run itself.
-        return f"{codec_title(run.video)} crf {run.video_quality}"
-    if query == reference:
-        return compression_text(query)
-    return f"{compression_text(query)} query, {compression_text(reference)} map"
+        said = f"{codec_title(run.video)} crf {run.video_quality}"
+    elif query == reference:
+        said = compression_text(query)
+    else:
+        said = f"{compression_text(query)} query, {compression_text(reference)} map"
+    return f"{said}, sent as {run.descriptor_coding}" if run.descriptor_coding else said

@@ -143,8 +143,15 @@ def page_title(chapter: Chapter) -> str:
 def _by_page(records: Sequence[RunRecord]) -> dict[str, list[RunRecord]]:
     pages: dict[str, list[RunRecord]] = {key: [] for key in CHAPTERS}
     for run in records:
-        pages[run.chapter if run.chapter in CHAPTERS else "runs"].append(run)
+        pages[_page_of(run)].append(run)
     return {key: runs for key, runs in pages.items() if any(run.status == "ok" for run in runs)}
+
+
+def _page_of(run: RunRecord) -> str:
+    """Return the page a run is on: the thesis' chapters are about pictures that are sent."""
+    if run.chapter not in CHAPTERS:
+        return "runs"
+    return "beyond" if run.descriptor_coding else run.chapter
 
 
 def _study_name(records: Sequence[RunRecord], study: Path) -> str:

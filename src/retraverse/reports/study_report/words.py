@@ -57,7 +57,7 @@ MEANINGS: Mapping[str, str] = {
     "group bytes": "Mean bytes of what is sent for a query frame × K; a picture of a video weighs "
     "its group's bytes / the group's pictures.",
     "time of a frame": "t_e + t_m: describing a new picture and matching the window that ends with "
-    "it, when the descriptors of the frames before are kept.",
+    "it, when the descriptors of the frames before are kept; and t_coding where they are sent.",
     "windows": "Query windows that were answered: Q − K + 1 for a fixed K.",
     "candidates": "Map windows that each of them could take: R − K + 1 for a fixed K.",
     "query picture": "Mean bytes of a query picture's file as it is sent and described.",
@@ -68,7 +68,9 @@ MEANINGS: Mapping[str, str] = {
     "PCU": "Precision per compute: P_R100 × log10(t_e of the slowest / t_e + 9); a sequence pays "
     "t_e K times.",
     "descriptor size": "Bytes of one picture's descriptor.",
-    "descriptor as sent": "Bytes of one query frame's descriptor in the coding it was sent in.",
+    "description as sent": "Bytes of all that is compared of one query frame, its descriptor in "
+    "the coding it was sent in.",
+    "t_coding": "Writing and reading one frame's descriptor as it was sent; it is in t_VPR.",
     "known before": "Bytes that both ends must have before the first descriptor is sent so.",
     "without keypoints": "Share of the query pictures in which the technique found nothing to "
     "describe.",
@@ -205,10 +207,11 @@ def number_columns(record: RunRecord, data: float) -> list[tuple[str, str]]:
         ("d", size_text(data)),
         ("legible height", percent(record.legible_height)),
         ("descriptor size", size_text(record.descriptor_bytes)),
-        ("descriptor as sent", size_text(record.coded_bytes)),
+        ("description as sent", size_text(record.coded_bytes)),
         ("known before", size_text(record.coding_shared_bytes)),
         ("t_e", seconds(record.encode_s)),
         ("t_m", seconds(record.match_s)),
         ("t_VPR", seconds(record.vpr_s)),
         ("t_c", seconds(record.compress_s)),
+        ("t_coding", seconds(record.coding_s)),
     ]

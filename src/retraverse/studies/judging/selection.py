@@ -184,8 +184,16 @@ def mean_bytes(record: RunRecord) -> float:
 
 
 def bytes_sent(record: RunRecord) -> float:
-    """Return the mean bytes that travel for one query frame: its picture, or its descriptor."""
-    return record.coded_bytes if record.descriptor_coding else record.query_bytes_mean
+    """Return the mean bytes that travel for one query frame: its picture, or its description.
+
+    What both ends need before the first is not in it. NaN if unknown.
+    """
+    if not record.descriptor_coding:
+        return record.query_bytes_mean
+    if record.coded_bytes < 0:
+        return math.nan
+    nothing = record.no_descriptor_share
+    return record.coded_bytes * (1 - (nothing if math.isfinite(nothing) else 0))
 
 
 def data_per_answer(record: RunRecord) -> float:

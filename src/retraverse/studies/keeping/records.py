@@ -38,7 +38,7 @@ __all__ = [
 Status = Literal["ok", "failed", "missing"]
 """``ok``: measured; ``failed``: see `error`; ``missing``: its data or weights are not here."""
 
-PERISHABLE = ("encode_s", "match_s", "vpr_s", "compress_s", "similarity_key")
+PERISHABLE = ("encode_s", "match_s", "vpr_s", "coding_s", "compress_s", "similarity_key")
 """Fields that may differ when the same run is repeated: times, and where the matrix was kept."""
 
 PERISHABLE_PROVENANCE = ("machine", "created", "kernel_backend", "versions", "n_timed")
@@ -137,7 +137,8 @@ class RunRecord:
     descriptor_coding: str = ""
     """How the query's descriptors were sent to where the map is; "" = its pictures were sent."""
     coded_bytes: int = -1
-    """Bytes of one frame's descriptor as it was sent, -1 where pictures were."""
+    """Bytes of one frame's description as it was sent, all that is compared; -1 where pictures
+    were sent. A frame without a descriptor sends none."""
     coding_shared_bytes: int = -1
     """Bytes that both ends must have had before the first descriptor, -1 likewise."""
     no_descriptor_share: float = math.nan
@@ -147,7 +148,9 @@ class RunRecord:
     match_s: float = math.nan
     """t_m: seconds to match one window against the whole map."""
     vpr_s: float = math.nan
-    """t_VPR = t_e K + t_m, seconds."""
+    """t_VPR = t_e K + t_m, seconds; where descriptors are sent t_e has what coding them takes."""
+    coding_s: float = math.nan
+    """Seconds to write and read one frame's descriptor as it was sent, NaN where pictures were."""
     compress_s: float = math.nan
     """t_c: seconds to resize-and-compress one query picture."""
     sequence_lengths: tuple[int, ...] = ()

@@ -1,12 +1,13 @@
 """What can be wrong between the parts of a plan, each of them sound."""
 
 import itertools
+from collections.abc import Iterable
 from contextlib import suppress
 
 from retraverse.datasets.known import Dataset
 from retraverse.errors import InputError, RetraverseError
 from retraverse.studies.plans.plan import CHUNK_FRAMES, PicturePair, StudyPlan
-from retraverse.techniques.sending import coding_label
+from retraverse.techniques.sending import Coding, coding_label
 
 __all__ = ["PlanError", "plan_problems"]
 
@@ -59,20 +60,24 @@ def _coding_problems(plan: StudyPlan) -> list[str]:
     problems = []
     size = next((pair.query.resize for pair in plan.pairs), None)
     for choice in plan.techniques:
+        sent = plan.sent_by(choice)
+        if len(set(sent)) < max(1, len(sent)):
+            problems.append(f"technique {choice.name}: sent: got {_labels(sent) or 'nothing'}, "
+                            "expected at least one, each once")  # fmt: skip
         with suppress(RetraverseError, TypeError):  # Said of the technique already.
             dtype = choice.at(size).make().layout.descriptor.dtype
-            wrong = [
-                coding_label(chosen)
-                for chosen in plan.sent_by(choice)
-                if chosen is not None and chosen.is_for_floats and dtype != "float32"
-            ]
+            wrong = [one for one in sent if one and one.is_for_floats and dtype != "float32"]
             if wrong:
                 problems.append(
                     f"technique {choice.name}: got descriptors of {dtype} to be sent as "
-                    f"{', '.join(wrong)}, which code float32 ones; give it sent of its own: "
+                    f"{_labels(wrong)}, which code float32 ones; give it sent of its own: "
                     "pictures, or exact"
                 )
     return problems
+
+
+def _labels(sent: Iterable[Coding | None]) -> str:
+    return ", ".join("pictures" if one is None else coding_label(one) for one in sent)
 
 
 def _picture_problems(plan: StudyPlan) -> list[str]:

@@ -271,10 +271,12 @@ class _Reader(TableReader):
         for value in self.listed("sent", table, (str, dict), default):
             chosen = {"name": value} if isinstance(value, str) else value
             self.known_keys("sent", chosen, ("name", "parameters"))
-            name = self.value("name", chosen, str, PICTURES, "sent")
+            name = self.value("name", chosen, str, "", "sent")
             parameters = self.value("parameters", chosen, dict, {}, "sent")
-            if name == PICTURES and not parameters:
+            if name == PICTURES:
                 found.append(None)
+                if parameters:
+                    self.problems.append(f"sent: got {PICTURES} with parameters, expected none")
             elif (made := self.attempt(partial(_coding, name, parameters))) is not None:
                 found.append(made)
         return tuple(dict.fromkeys(found))

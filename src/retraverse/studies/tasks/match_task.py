@@ -41,7 +41,7 @@ from retraverse.studies.tasks.describe_task import TIMES, made_technique, one_li
 from retraverse.studies.tasks.window_answers import Answers, answer_windows, timed_answers
 from retraverse.techniques import Descriptions, Technique
 from retraverse.techniques.handmade.regional_hog import RegionalHog
-from retraverse.techniques.sending import Coding, received
+from retraverse.techniques.sending import Coding, Received, received
 from retraverse.types import Array, FloatArray
 
 __all__ = [
@@ -163,10 +163,11 @@ class _Pair:
     def __init__(self, task: MatchTask) -> None:
         self.task = task
         self.technique: Technique = made_technique(task.technique)
-        self.made: Mapping[str, Array] | None = None
+        self.made: dict[str, Array] | None = None
         self.n_empty_roi = 0
         self._route: RouteMap | None = None
-        self._queries: Descriptions | None = None
+        self._seen: Descriptions | None = None
+        self._arrived: Received | None = None
         self._answers: dict[SequenceLength, Answers | Exception] | None = None
         if isinstance(self.technique, RegionalHog):
             # Whoever gives out the tasks says it once for all of them.
@@ -175,21 +176,31 @@ class _Pair:
         self.scores: FloatArray = entry["similarity"]
         self.row_s = float(entry["row_s"])
         self.encode_s = float(entry["encode_s"])
+        # None in the matrices of pictures.
+        self.coding_s = float(entry.get("coding_s", math.nan))
         self.no_descriptor_share = float(entry["no_descriptor_share"])
         self.no_descriptor = ~entry["has_descriptor"].astype(bool)
 
     @property
-    def queries(self) -> Descriptions:
-        """The query's descriptions as they arrive, with entropy where it was sent."""
-        if self._queries is None:
-            self._queries = _gather(self.task.query).descriptions
-            if self.task.sent is not None:
+    def seen(self) -> Descriptions:
+        """The query's descriptions where they are made, with entropy where it was sent."""
+        if self._seen is None:
+            self._seen = _gather(self.task.query).descriptions
+            entropy = self.task.query_entropy
+            if entropy and "entropy" not in self._seen.arrays:
+                self._seen = with_entropy(self._seen, np.array(entropy))
+        return self._seen
+
+    @property
+    def arrived(self) -> Received:
+        """The query's descriptions where the map is."""
+        if self._arrived is None:
+            if self.task.sent is None:
+                self._arrived = Received(self.seen, math.nan)
+            else:
                 known = self.route.descriptions()
-                self._queries = received(self._queries, known, self.task.sent)
-        entropy = self.task.query_entropy
-        if entropy and "entropy" not in self._queries.arrays:
-            self._queries = with_entropy(self._queries, np.array(entropy))
-        return self._queries
+                self._arrived = received(self.seen, known, self.task.sent)
+        return self._arrived
 
     @property
     def route(self) -> RouteMap:
@@ -206,20 +217,23 @@ class _Pair:
                 for spec in self.task.runs
                 if _goes_beyond_matrix(self.technique, spec)
             )
-            self._answers = answer_windows(self.queries, self.route, self.scores, lengths)
+            arrived = self.arrived.descriptions
+            self._answers = answer_windows(
+                arrived, self.route, self.scores, lengths, lengths_by=self.seen
+            )
         found = self._answers[length]
         if isinstance(found, Exception):
             raise found
         return found
 
     def _make(self) -> Mapping[str, Array]:
-        queries, route = self.queries, self.route
+        queries, route = self.arrived.descriptions, self.route
         if not getattr(self.technique, "compares_whole_drives", False):
             self.technique.similarity(queries[:1], queries[:1])  # Warm up: not part of the time.
         began = time.perf_counter()
         scores = similarity(queries, route)
         row_s = (time.perf_counter() - began) / len(queries)
-        described = has_descriptor(queries)
+        described = has_descriptor(self.seen)
         if isinstance(self.technique, RegionalHog):
             self.n_empty_roi = int(self.technique.empty_roi(queries).sum())
         self.made = {
@@ -229,6 +243,8 @@ class _Pair:
             "no_descriptor_share": np.array(1 - described.mean()),
             "has_descriptor": described,
         }
+        if self.task.sent is not None:
+            self.made["coding_s"] = np.array(self.arrived.frame_s)
         return self.made
 
 
@@ -238,6 +254,7 @@ def _run(pair: _Pair, spec: RunSpec) -> RunRecord:
     evaluation = evaluate(matches, pair.task.truth, seed=spec.seed)
     length = evaluation.mean_sequence_length
     match_s = length * pair.row_s + answers.window_s
+    describe_s = pair.encode_s + (0 if math.isnan(pair.coding_s) else pair.coding_s)
     return replace(
         _base(pair.task.base, spec),
         mean_sequence_length=length,
@@ -253,7 +270,8 @@ def _run(pair: _Pair, spec: RunSpec) -> RunRecord:
         no_descriptor_share=pair.no_descriptor_share,
         encode_s=pair.encode_s,
         match_s=match_s,
-        vpr_s=t_vpr(pair.encode_s, match_s, length) if length > 0 else math.nan,
+        vpr_s=t_vpr(describe_s, match_s, length) if length > 0 else math.nan,
+        coding_s=pair.coding_s,
         sequence_lengths=(
             tuple(matches.sequence_length.tolist()) if spec.sequence_length == "dynamic" else ()
         ),

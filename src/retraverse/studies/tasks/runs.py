@@ -30,7 +30,7 @@ from retraverse.studies.plans.plan import (
 )
 from retraverse.studies.tasks.describe_task import made_technique, one_line_reason
 from retraverse.studies.tasks.match_task import RunSpec, needs_descriptions
-from retraverse.techniques.sending import Coding, coding_label
+from retraverse.techniques.sending import Coding, coding_label, sent_bytes
 from retraverse.types import Progress, no_progress
 
 __all__ = ["CODE", "Chunk", "Drive", "Job", "jobs", "read_drive"]
@@ -122,7 +122,7 @@ class Job:
             self._pictures(worsening, bytes.fromhex(drive.content_hash))
             for drive, worsening in self.sides
         ]
-        coded = () if self.sent is None else ("sent as", self.sent.name, vars(self.sent))
+        coded = () if self.sent is None else ("sent", self.sent.name, vars(self.sent))
         return content_key(CODE, "matrix", self.identity, *sides, *coded)
 
     @property
@@ -170,7 +170,7 @@ class Job:
         pair, truth = self.pair, None if self.error else self.dataset.truth()
         coded = shared = -1
         if layout is not None and self.sent is not None:
-            coded = self.sent.n_bytes(layout.descriptor)
+            coded = sent_bytes(layout, self.sent)
             shared = self.sent.n_shared_bytes(layout.descriptor)
         encoded = [side for side in (pair.query, pair.reference) if side.compression is not None]
         video = pair.query.video

@@ -43,17 +43,22 @@ def answer_windows(
     route: RouteMap,
     scores: FloatArray,
     sequence_lengths: Iterable[SequenceLength],
+    *,
+    lengths_by: Descriptions,
 ) -> dict[SequenceLength, Answers | Exception]:
     """Return the mean's answers for several lengths, as `match` gives them one by one.
 
     Parameters
     ----------
     queries : Descriptions
-        With entropy, where a length is "dynamic".
+        As they are compared with the map.
     route : RouteMap
     scores : float32 array, shape (Q, R)
         The similarity matrix of single frames.
     sequence_lengths : iterable of int or "dynamic"
+    lengths_by : Descriptions
+        The query's as it was described, with entropy, where a length is "dynamic": who drives
+        knows how much changes from frame to frame, whatever becomes of it on the way.
 
     Returns
     -------
@@ -65,7 +70,7 @@ def answer_windows(
     refused: dict[SequenceLength, Exception] = {}
     for length in sequence_lengths:
         try:
-            windows[length] = _timed_windows(queries, route, scores, length)
+            windows[length] = _timed_windows(lengths_by, route, scores, length)
         except Exception as error:
             refused[length] = error
     choices = [lengths for lengths, _ in windows.values()]

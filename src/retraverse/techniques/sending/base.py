@@ -6,15 +6,17 @@ Conventions
 - Every message of a coding has the same length, whatever the frame.
 """
 
+import time
+from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
 import numpy as np
 
 from retraverse.errors import ShapeError
-from retraverse.techniques.base import ArraySpec, Descriptions
+from retraverse.techniques.base import ArraySpec, Descriptions, Layout
 from retraverse.types import Array, ImageArray
 
-__all__ = ["Coder", "Coding", "received"]
+__all__ = ["Coder", "Coding", "Received", "received", "sent_bytes"]
 
 _BLOCK_ROWS = 64
 """Frames that are coded in one go; bounds memory."""
@@ -55,14 +57,29 @@ class Coding(Protocol):
         ...
 
 
-def received(queries: Descriptions, references: Descriptions, chosen: Coding) -> Descriptions:
+@dataclass(frozen=True)
+class Received:
+    """Descriptions as they arrive where the map is."""
+
+    descriptions: Descriptions
+    frame_s: float
+    """Seconds that writing and reading one frame's message took."""
+
+
+def sent_bytes(layout: Layout, chosen: Coding) -> int:
+    """Return the bytes of one frame's description: arrays beside the descriptor go as they are."""
+    others = sum(spec.n_bytes for name, spec in layout.arrays.items() if name != "descriptor")
+    return chosen.n_bytes(layout.descriptor) + others
+
+
+def received(queries: Descriptions, references: Descriptions, chosen: Coding) -> Received:
     """Return the query's descriptions as they arrive where the map is.
 
     Parameters
     ----------
     queries, references : Descriptions
-        Of the query and of the map. A frame without a descriptor (all zeros) sends nothing and
-        stays so.
+        Of the query and of the map. A frame without a descriptor (all zeros) sends none, and none
+        arrives.
     chosen : Coding
 
     Raises
@@ -78,8 +95,11 @@ def received(queries: Descriptions, references: Descriptions, chosen: Coding) ->
     rows = sent.reshape(len(sent), -1)
     coder = chosen.coder(known.reshape(len(known), -1))
     arrived = np.zeros_like(rows)
-    for start in range(0, len(rows), _BLOCK_ROWS):
-        block = rows[start : start + _BLOCK_ROWS]
-        there = block.any(axis=1)
-        arrived[start : start + len(block)][there] = coder.decode(coder.encode(block[there]))
-    return Descriptions({**queries.arrays, "descriptor": arrived.reshape(sent.shape)})
+    there = np.flatnonzero(rows.any(axis=1))
+    began = time.perf_counter()
+    for start in range(0, len(there), _BLOCK_ROWS):
+        block = there[start : start + _BLOCK_ROWS]
+        arrived[block] = coder.decode(coder.encode(rows[block]))
+    frame_s = (time.perf_counter() - began) / max(1, len(there))
+    arrays = {**queries.arrays, "descriptor": arrived.reshape(sent.shape)}
+    return Received(Descriptions(arrays), frame_s)

@@ -24,8 +24,8 @@ class Projected:
     """Principal components of the map's descriptors, one byte each.
 
     Directions are learned from the map alone, no label and no query; who sends must have been
-    given them (`n_shared_bytes`). A map of fewer frames has fewer directions: the bytes that are
-    over are zero.
+    given them (`n_shared_bytes`), as float32. Frames of the map without a descriptor do not count.
+    A map of fewer frames has fewer directions: the bytes that are over are zero.
     """
 
     name: ClassVar[str] = "projected"
@@ -50,8 +50,11 @@ class Projected:
 
     def coder(self, reference: Array) -> "ProjectedCoder":
         """See `Coding.coder`."""
-        rows = np.linspace(0, len(reference) - 1, min(len(reference), _MOST_FRAMES)).astype(int)
-        some = reference[rows].astype(np.float64)
+        described = np.flatnonzero(reference.any(axis=1))
+        if not len(described):
+            described = np.zeros(1, int)
+        places = np.linspace(0, len(described) - 1, min(len(described), _MOST_FRAMES))
+        some = reference[described[places.astype(int)]].astype(np.float64)
         mean = some.mean(axis=0)
         some -= mean
         # Of the small matrix of products: frames are fewer than numbers.
@@ -62,12 +65,17 @@ class Projected:
         steps = np.zeros(self.dimensions)
         directions[: len(kept)] = (mixes[:, kept] / np.sqrt(variance[kept])).T @ some
         steps[: len(kept)] = np.sqrt(variance[kept] / len(some)) * _REACH / 127
-        return ProjectedCoder(mean, directions, steps)
+        return ProjectedCoder(*map(_as_shared, (mean, directions, steps)))
+
+
+def _as_shared(values: Array) -> Array:
+    """Return numbers as both ends have them: float32 in value, float64 in type."""
+    return values.astype(np.float32).astype(np.float64)
 
 
 @dataclass(frozen=True)
 class ProjectedCoder:
-    """Both ends of a projection, in float64 so that rounding does not depend on the machine."""
+    """Both ends of a projection; sums in float64, so that bytes do not depend on their order."""
 
     mean: Array
     """Of the map's descriptors, (D,)."""

@@ -20,14 +20,15 @@ _MOST_BITS = 1 << 20
 class Sketch:
     """One bit for each of some random directions: on which side of zero the descriptor lies.
 
-    After Charikar, "Similarity estimation techniques from rounding algorithms", STOC, 2002; the
-    directions are rows of a Hadamard matrix under random changes of sign (Ailon and Chazelle, "The
-    fast Johnson-Lindenstrauss transform", SIAM J. Comput. 39, 2009), so that a descriptor of D
-    numbers costs D log D additions for every D directions. They follow from a seed: nothing is
-    learned, nothing has to be exchanged before. The descriptor's length is sent as well.
+    After Charikar, "Similarity estimation techniques from rounding algorithms", STOC, 2002. Each
+    block of directions is a random rotation: twice random changes of sign and a Hadamard matrix,
+    as in Ailon and Chazelle, "The fast Johnson-Lindenstrauss transform and approximate nearest
+    neighbors", SIAM J. Comput. 39, 2009; once would leave a descriptor of few large numbers in few
+    directions. D numbers cost D log D additions for every D directions. They follow from a seed:
+    nothing is learned, nothing has to be exchanged before. The descriptor's length is sent as well.
 
-    What arrives is the mean of the directions, each with its sign, at that length: the expectation
-    of its product with any vector is proportional to the descriptor's own.
+    What arrives is the sum of the directions, each with its sign, at that length. Over many seeds
+    its mean points where the descriptor does, so that products with any vector keep their order.
     """
 
     name: ClassVar[str] = "sketch"
@@ -56,7 +57,28 @@ class Sketch:
     def coder(self, reference: Array) -> "SketchCoder":
         """See `Coding.coder`."""
         dimension = reference.shape[1]
-        return SketchCoder(dimension, _directions(dimension, self.bits, self.seed))
+        return SketchCoder(dimension, _rotations(dimension, self.bits, self.seed))
+
+
+@dataclass(frozen=True)
+class Rotation:
+    """Random changes of sign and the Hadamard matrix, twice, and which of its rows are used."""
+
+    flips: FloatArray
+    """+1 or -1 for every number of both rounds, (2, padded D)."""
+    chosen: IntArray
+
+    def turn(self, rows: FloatArray) -> FloatArray:
+        """Return how far rows (N, padded D) reach along the directions, (N, directions)."""
+        first, second = self.flips
+        return np.asarray(_hadamard(_hadamard(rows * first) * second)[:, self.chosen])
+
+    def turn_back(self, along: FloatArray) -> FloatArray:
+        """Return the sum of the directions with such weights, (N, padded D)."""
+        first, second = self.flips
+        rows = np.zeros((len(along), len(first)), np.float32)
+        rows[:, self.chosen] = along
+        return np.asarray(_hadamard(_hadamard(rows) * second) * first)
 
 
 @dataclass(frozen=True)
@@ -64,16 +86,13 @@ class SketchCoder:
     """Both ends of a sketch."""
 
     dimension: int
-    blocks: tuple[tuple[FloatArray, IntArray], ...]
-    """For each block of directions +1 or -1 for every number, (D,), and the rows of the Hadamard
-    matrix that are looked at: all, but in the last block."""
+    rotations: tuple[Rotation, ...]
+    """One for each block of directions; all of its rows are used, but in the last."""
 
     def encode(self, rows: Array) -> ImageArray:
         """See `Coder.encode`."""
-        padding = (0, 0), (0, _padded(self.dimension) - self.dimension)
-        along = [
-            _hadamard(np.pad(rows * flips, padding))[:, chosen] for flips, chosen in self.blocks
-        ]
+        padded = np.pad(rows, ((0, 0), (0, _padded(self.dimension) - self.dimension)))
+        along = [rotation.turn(padded) for rotation in self.rotations]
         signs = np.packbits(np.concatenate(along, axis=1) >= 0, axis=1)
         return np.concatenate([_lengths(rows).astype("<f4").view(np.uint8), signs], axis=1)
 
@@ -82,10 +101,9 @@ class SketchCoder:
         length = np.ascontiguousarray(messages[:, :4]).view("<f4")
         signs = np.unpackbits(messages[:, 4:], axis=1).astype(np.float32) * 2 - 1
         rows = np.zeros((len(messages), self.dimension), np.float32)
-        for flips, chosen in self.blocks:
-            along = np.zeros((len(messages), _padded(self.dimension)), np.float32)
-            along[:, chosen], signs = signs[:, : len(chosen)], signs[:, len(chosen) :]
-            rows += _hadamard(along)[:, : self.dimension] * flips
+        for rotation in self.rotations:
+            block, signs = np.split(signs, [len(rotation.chosen)], axis=1)
+            rows += rotation.turn_back(block)[:, : self.dimension]
         scale = _lengths(rows)
         return np.asarray(rows * (length / np.where(scale > 0, scale, 1)), np.float32)
 
@@ -95,16 +113,17 @@ def _lengths(rows: FloatArray) -> Array:
 
 
 @lru_cache(maxsize=8)
-def _directions(dimension: int, bits: int, seed: int) -> tuple[tuple[FloatArray, IntArray], ...]:
-    """Return signs and rows that any version of any library makes of a seed."""
+def _rotations(dimension: int, bits: int, seed: int) -> tuple[Rotation, ...]:
+    """Return the rotations that any version of any library makes of a seed."""
     size = _padded(dimension)
-    blocks = []
+    made = []
     for block, start in enumerate(range(0, bits, size)):
         name = f"retraverse sketch {seed} {block}".encode()
         words = np.frombuffer(hashlib.shake_256(name).digest(8 * size), "<u8")
-        flips = np.where(words[:dimension] & 1, 1, -1).astype(np.float32)
-        blocks.append((flips, np.argsort(words >> 1, kind="stable")[: bits - start]))
-    return tuple(blocks)
+        flips = [np.where(words >> bit & 1, 1, -1).astype(np.float32) for bit in range(2)]
+        chosen = np.argsort(words >> 2, kind="stable")[: bits - start]
+        made.append(Rotation(np.array(flips), chosen))
+    return tuple(made)
 
 
 def _padded(dimension: int) -> int:

@@ -85,13 +85,17 @@ def test_descriptors_are_a_choice_by_bytes_and_not_by_time() -> None:
     runs = [replace(run, accuracy=0.97) for run in (coded, WHOLE)]
     chosen = [row for row in choices_table(runs).rows if not row.absent]
     by_bytes = [row for row in chosen if "bytes" in row.cells[2].text]
-    assert {row.cells[5].text for row in by_bytes} == {"descriptors, sketch"}
+    assert {row.cells[5].text for row in by_bytes} == {"as is, sent as sketch"}
     assert {row.cells[5].text for row in chosen if row not in by_bytes} == {"97"}
     assert math.isnan(frame_seconds(coded))
+    timed = replace(coded, encode_s=0.5, match_s=0.25, coding_s=0.125)
+    assert frame_seconds(timed) == 0.875
     # What must be known before is said where anything must.
-    assert "known before" not in choices_table(runs).caption
-    learned = [replace(run, coding_shared_bytes=9) for run in runs]
-    assert "known before" in choices_table(learned).caption
+    assert "before the first" not in choices_table(runs).caption
+    learned = choices_table([replace(runs[0], coding_shared_bytes=1_240_000), runs[1]])
+    assert "before the first" in learned.caption
+    notes = {row.cells[7].note for row in learned.rows if row.cells[5].text != "97"}
+    assert notes == {"and 1.24\u202fMB before"}
 
 
 def test_one_part_of_jpeg_is_no_choice_and_video_is_one() -> None:

@@ -214,6 +214,11 @@ def test_a_drive_too_short_for_another_speed(tmp_path: Path) -> None:
         ("sent = []", "sent: got nothing, expected at least one"),
         ('sent = [{ name = "sketch", parameters = { bits = 9 } }]', "bits: got 9, expected a mult"),
         ('sent = [{ name = "sketch", bits = 8 }]', "unknown key in sent: got 'bits'"),
+        ("sent = [{ parameters = { bits = 8 } }]", "unknown sent: got ''"),
+        (
+            'sent = [{ name = "pictures", parameters = { bits = 8 } }]',
+            "sent: got pictures with parameters, expected none",
+        ),
         (
             'techniques = ["patchnorm"]\nsent = ["exact", "int8", "sketch"]',
             "technique patchnorm: got descriptors of uint8 to be sent as int8, sketch",

@@ -17,7 +17,7 @@ def test_each_length_as_alone_and_a_bad_one_spoils_no_other(roi: str) -> None:
     queries = describe_query(rt.open_traverse(street(12, seed=1)), route)
     scores = rt.similarity(queries, route)
     lengths: list[rt.SequenceLength] = [2, 13, "dynamic", 5, 1]
-    answers = answer_windows(queries, route, scores, lengths)
+    answers = answer_windows(queries, route, scores, lengths, lengths_by=queries)
     refusal = answers.pop(13)
     assert isinstance(refusal, InputError)
     assert "the query has only 12 frames" in str(refusal)
@@ -34,6 +34,7 @@ def test_each_length_as_alone_and_a_bad_one_spoils_no_other(roi: str) -> None:
 def test_a_technique_without_entropy_is_refused_dynamic_lengths_only() -> None:
     route = rt.build_map(rt.open_traverse(street(14)), rt.technique("hog", resolution=64))
     queries = describe_query(rt.open_traverse(street(12)), route)
-    answers = answer_windows(queries, route, rt.similarity(queries, route), ["dynamic", 3])
+    scores = rt.similarity(queries, route)
+    answers = answer_windows(queries, route, scores, ["dynamic", 3], lengths_by=queries)
     assert "hold no entropy" in str(answers["dynamic"])
     assert isinstance(answers[3], Answers)

@@ -32,10 +32,8 @@ def drawn(n_rows: int, seed: int = 3, dimension: int = DIMENSION) -> FloatArray:
 
 
 def arrived(rows: FloatArray, chosen: Coding, known: FloatArray) -> FloatArray:
-    there = received(
-        Descriptions({"descriptor": rows}), Descriptions({"descriptor": known}), chosen
-    )
-    return np.asarray(there.descriptor)
+    queries, references = (Descriptions({"descriptor": one}) for one in (rows, known))
+    return np.asarray(received(queries, references, chosen).descriptions.descriptor)
 
 
 def test_every_coding_is_tried() -> None:
@@ -90,15 +88,25 @@ def test_numbers_arrive_within_their_step(rows: FloatArray) -> None:
     assert (np.abs(byte - rows) <= largest / 254 * 1.001 + 1e-37).all()
 
 
+def sylvester(size: int) -> FloatArray:
+    matrix = np.ones((1, 1), np.float32)
+    while len(matrix) < size:
+        matrix = np.block([[matrix, matrix], [matrix, -matrix]])
+    return matrix
+
+
 @pytest.mark.parametrize("bits", [16, 32, 80])
 def test_a_sketch_is_the_sum_of_its_directions(bits: int) -> None:
     """Against the definition, with the Hadamard matrix written out."""
-    sylvester = np.array([[1.0]])
-    for _ in range(5):
-        sylvester = np.block([[sylvester, sylvester], [sylvester, -sylvester]])
+    hadamard = sylvester(32)
     coder = Sketch(bits=bits, seed=2).coder(drawn(1, dimension=30))
     directions = np.concatenate(
-        [sylvester[chosen, :30] * flips for flips, chosen in coder.blocks], axis=0
+        [
+            (hadamard @ np.diag(rotation.flips[1]) @ hadamard @ np.diag(rotation.flips[0]))[
+                rotation.chosen, :30
+            ]
+            for rotation in coder.rotations
+        ]
     )
     assert len(np.unique(directions, axis=0)) == len(directions) == bits
     rows = drawn(6, dimension=30)
@@ -122,17 +130,36 @@ def test_sketches_keep_who_is_alike() -> None:
     assert abs(share - (1 - np.arccos(cosine) / np.pi)) < 4 * 0.5 / np.sqrt(bits)
 
 
+@pytest.mark.parametrize(
+    "large", [[3, 1, 1], [3, *[0.3] * 63], [0.33, 0.33, 1, 0.33]], ids=["few", "one", "sparse"]
+)
+def test_sketches_of_few_large_numbers_point_where_they_do(large: list[float]) -> None:
+    """Over seeds; one round of flips would leave the largest number alone."""
+    row = np.zeros((1, 64), np.float32)
+    row[0, : len(large)] = large
+    arrivals = [
+        coder.decode(coder.encode(row))[0]
+        for coder in (Sketch(bits=64, seed=seed).coder(row) for seed in range(400))
+    ]
+    mean = np.mean(arrivals, axis=0)
+    cosine = float(mean @ row[0] / np.linalg.norm(mean) / np.linalg.norm(row))
+    assert cosine > 0.97
+
+
 def test_the_directions_of_a_seed_are_fixed() -> None:
     """They are part of the format: whoever decodes may run another version of everything."""
     coder = Sketch(bits=24, seed=5).coder(drawn(1, dimension=16))
-    for block, (flips, chosen) in enumerate(coder.blocks):
+    assert len(coder.rotations) == 2
+    for block, rotation in enumerate(coder.rotations):
         stream = hashlib.shake_256(f"retraverse sketch 5 {block}".encode()).digest(8 * 16)
         words = [int.from_bytes(stream[8 * i : 8 * i + 8], "little") for i in range(16)]
-        assert flips.tolist() == [1 if word % 2 else -1 for word in words]
-        ordered = sorted(range(16), key=lambda i: words[i] // 2)
-        assert chosen.tolist() == ordered[: (16, 8)[block]]
+        for bit in range(2):
+            wanted = [1 if word >> bit & 1 else -1 for word in words]
+            assert rotation.flips[bit].tolist() == wanted
+        ordered = sorted(range(16), key=lambda i: words[i] >> 2)
+        assert rotation.chosen.tolist() == ordered[: (16, 8)[block]]
     other = Sketch(bits=24, seed=6).coder(drawn(1, dimension=16))
-    assert other.blocks[0][1].tolist() != coder.blocks[0][1].tolist()
+    assert other.rotations[0].chosen.tolist() != coder.rotations[0].chosen.tolist()
 
 
 def test_a_projection_keeps_what_lies_in_the_map() -> None:
@@ -156,6 +183,22 @@ def test_the_directions_are_the_principal_ones() -> None:
     expected = np.linalg.svd(known - known.mean(axis=0), full_matrices=False)[2][:6]
     alignment = np.abs(np.sum(coder.directions * expected, axis=1))  # type: ignore[attr-defined]
     np.testing.assert_allclose(alignment, 1, atol=1e-5)
+
+
+def test_frames_of_the_map_without_a_descriptor_teach_nothing() -> None:
+    known, rows = drawn(20), drawn(6, seed=5)
+    with_nothing = np.insert(known, [3, 9], 0, axis=0)
+    chosen = coding("projected", dimensions=5)
+    np.testing.assert_array_equal(arrived(rows, chosen, with_nothing), arrived(rows, chosen, known))
+    assert not arrived(rows, chosen, 0 * known).any()
+
+
+def test_both_ends_share_no_more_than_they_are_charged_for() -> None:
+    coder = coding("projected", dimensions=5).coder(drawn(20))
+    for values in vars(coder).values():
+        np.testing.assert_array_equal(values, values.astype(np.float32))
+    n_numbers = sum(values.size for values in vars(coder).values())
+    assert 4 * n_numbers == coding("projected", dimensions=5).n_shared_bytes(SPEC)
 
 
 @pytest.mark.parametrize("n_frames", [1, 2])
@@ -198,7 +241,9 @@ def test_what_cannot_be(name: str, parameters: dict[str, int], message: str) -> 
 
 def test_bytes_are_sent_as_they_are_and_not_coded_again() -> None:
     rows = Descriptions({"descriptor": drawn(5).astype(np.uint8)})
-    np.testing.assert_array_equal(received(rows, rows, coding("exact")).descriptor, rows.descriptor)
+    np.testing.assert_array_equal(
+        received(rows, rows, coding("exact")).descriptions.descriptor, rows.descriptor
+    )
     assert coding("exact").n_bytes(ArraySpec((12, 8), "uint8")) == 96
     with pytest.raises(ShapeError, match="got uint8, expected float32 to be sent as int8"):
         received(rows, rows, coding("int8"))

@@ -106,8 +106,8 @@ def data_figure(runs: Runs) -> Artefact:
         title="Accuracy for the bytes of an answer",
         x_label="d, kB",
         y_label="Accuracy, %",
-        caption="Every mix of c and K (some ten K of each) that no cheaper mix beats, query and "
-        "map compressed alike.",
+        caption="Every mix of c and K (some ten K of each) that no cheaper mix of its line beats; "
+        "JPEG files of query and map compressed alike.",
         definitions=meanings("d", "accuracy"),
         is_log=(True, False),
         y_limits=PERCENT,

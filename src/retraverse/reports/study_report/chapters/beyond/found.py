@@ -148,23 +148,30 @@ def _cases_by_dataset(cases: Iterable[WayCase]) -> Iterable[tuple[str, list[WayC
 
 
 def _bytes_of_ways(cases: Sequence[WayCase]) -> str:
-    """Return what a window of the longest K weighs in every way, over the techniques."""
-    longest = max((case.length for case in cases), key=lambda length: (len(length), length))
+    """Return what a window of the longest fixed K weighs in every way, over the techniques."""
+    lengths = {case.length for case in cases}
+    fixed = {length for length in lengths if length.isdigit()}
+    longest = max(fixed or lengths, key=lambda length: (len(length), length))
     here = [case for case in cases if case.length == longest]
-    sizes = {
-        name: [data_per_answer(run) for case in here if (run := case.cheapest(name)) is not None]
-        for name in dict.fromkeys(name for case in here for name in case.by_way)
-    }
-    words = [f"{name} {_span(found)}" for name, found in sizes.items() if found]
+    words = [
+        f"{name} {_span(name, here)}" for name in dict.fromkeys(n for c in here for n in c.by_way)
+    ]
     return (
-        f"a window no worse than with exact descriptors weighs, by technique: {', '.join(words)} "
+        f"a window no worse than with exact descriptors weighs, by technique: {'; '.join(words)} "
         f"(K = {longest})."
     )
 
 
-def _span(sizes: Sequence[float]) -> str:
-    ends = [size_text(size) for size in (min(sizes), max(sizes))]
-    return ends[0] if len(set(ends)) == 1 else f"{ends[0]} to {ends[1]}"
+def _span(way: str, cases: Sequence[WayCase]) -> str:
+    """Return the least and the most bytes, and of how many of the techniques that were tried."""
+    tried = [case for case in cases if way in case.by_way]
+    runs = [run for case in tried if (run := case.cheapest(way)) is not None]
+    if not runs:
+        return "none"
+    sizes = [data_per_answer(run) for run in runs]
+    ends = list(dict.fromkeys(size_text(size) for size in (min(sizes), max(sizes))))
+    span = " to ".join(ends)
+    return span if len(runs) == len(tried) else f"{span} ({len(runs)} of {len(tried)} techniques)"
 
 
 def _saved_of_jpeg(cases: Sequence[WayCase]) -> str:

@@ -55,7 +55,8 @@ class PartColumn:
 
 def part_columns(records: Iterable[RunRecord]) -> list[PartColumn]:
     """Return what there is to compare, techniques for a moved viewpoint first."""
-    groups = settings_with(records, lambda run: bool(run.jpeg_part))
+    files = [run for run in records if not (run.video or run.descriptor_coding)]
+    groups = settings_with(files, lambda run: bool(run.jpeg_part))
     named = Runs(
         [replace(run, jpeg_part="", encoder="") for runs in groups.values() for run in runs],
         SeriesBook({}),

@@ -55,9 +55,9 @@ def sending_artefacts(given: ChapterInput) -> tuple[Artefact, ...]:
         "Bytes of a window at equal accuracy, descriptors and pictures",
         "The fewest bytes with an accuracy of at least the lower end of the interval of exact "
         "descriptors; beside it the bytes of a frame, JPEG's c or the video's crf. Exact "
-        "descriptors take four bytes a number, CoHOG's one. “sketch” needs nothing but a seed; "
-        "“projected” needs the map's directions at the sender first, which are not in these bytes. "
-        "Pictures need neither, serve any technique, and can be looked at.",
+        "descriptors take four bytes a number, of some techniques one. “sketch” needs nothing but "
+        "a seed; “projected” needs the map's directions at the sender first, which are not in "
+        "these bytes. Pictures need neither, serve any technique, and can be looked at.",
         "exact descriptors",
     )
     return table, *ways_figures(cases, "accuracy for the bytes of a window, descriptors, pictures")

@@ -54,8 +54,11 @@ class WayCase:
 
     @property
     def finest(self) -> RunRecord:
-        """Return the run of the base that sends most."""
-        return max(self.by_way[self.base], key=data_per_answer)
+        """Return the run of the base that sends most; of equals the most accurate."""
+        return max(
+            self.by_way[self.base],
+            key=lambda run: (data_per_answer(run), run.accuracy, run.run_id),
+        )
 
     def cheapest(self, way: str) -> RunRecord | None:
         """Return the run of fewest bytes that is not shown to be worse than the finest."""
@@ -68,7 +71,7 @@ def way_cases(
     way_of: Callable[[RunRecord], Way],
     is_wanted: Callable[[RunRecord], bool],
 ) -> list[WayCase]:
-    """Return what there is to compare: settings with runs of the base and of others.
+    """Return what there is to compare: settings and maps with runs of the base and of others.
 
     Parameters
     ----------
@@ -78,28 +81,40 @@ def way_cases(
     way_of : callable
         How a run's query was sent.
     is_wanted : callable
-        Says whether a run makes its setting worth comparing. Runs of other ways count if their map
-        is that of one of these.
+        Says whether a run makes its setting and map worth comparing.
     """
-    groups = settings_with(records, is_wanted)
+    compared = [run for run in records if way_of(run).name]
+    groups = [
+        of_map
+        for runs in settings_with(compared, is_wanted).values()
+        for of_map in _by_map(runs)
+        if any(map(is_wanted, of_map))
+    ]
     plain = [
         replace(run, video="", group_length=0, encoder="", descriptor_coding="")
-        for runs in groups.values()
+        for runs in groups
         for run in runs
     ]
     named = Runs(plain, SeriesBook({}))
     cases = []
-    for runs in groups.values():
-        maps = {run.compression_reference for run in runs if is_wanted(run)}
+    for runs in groups:
         by_way: dict[str, list[RunRecord]] = {base: []}
-        for run in sorted(runs, key=lambda run: (way_of(run), -data_per_answer(run))):
-            if run.compression_reference in maps and (name := way_of(run).name):
-                by_way.setdefault(name, []).append(run)
+        for run in sorted(runs, key=lambda run: (way_of(run), -data_per_answer(run), run.run_id)):
+            by_way.setdefault(way_of(run).name, []).append(run)
         if by_way[base] and len(by_way) > 1:
             first = runs[0]
             series = named.series_of(first)
             cases.append(WayCase(series, first.dataset, first.sequence_length, base, by_way))
     return cases
+
+
+def _by_map(runs: Iterable[RunRecord]) -> list[list[RunRecord]]:
+    """Return the runs of each map: pictures as they are, or compressed alike."""
+    found: dict[tuple[int, str], list[RunRecord]] = {}
+    for run in runs:
+        compression = run.compression_reference
+        found.setdefault((compression, run.encoder if compression >= 0 else ""), []).append(run)
+    return [found[key] for key in sorted(found)]
 
 
 def saved_share(case: WayCase, way: str, against: str) -> float:
@@ -216,11 +231,15 @@ def _cells(case: WayCase, ways: Sequence[str], others: Sequence[str]) -> tuple[C
     finest = case.finest
     interval = f"({100 * finest.accuracy_low:.0f} to {100 * finest.accuracy_high:.0f})"
     return (
-        Cell(case.length, finest.mean_sequence_length),
+        Cell(case.length, finest.mean_sequence_length, note=_map_words(finest)),
         Cell(f"{100 * finest.accuracy:.1f} %", finest.accuracy, finest, note=interval),
         *(_bytes(case, name) for name in ways),
         *(_saved(saved_share(case, name, case.base)) for name in others),
     )
+
+
+def _map_words(run: RunRecord) -> str:
+    return f"map c = {run.compression_reference}" if run.compression_reference >= 0 else ""
 
 
 def _bytes(case: WayCase, way: str) -> Cell:

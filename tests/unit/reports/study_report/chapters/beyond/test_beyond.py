@@ -187,6 +187,31 @@ def test_descriptors_are_compared_with_pictures(report: Path) -> None:
     assert lines == {"exact", "int8", "sketch", "projected", *VIDEO_WAYS}
 
 
+def test_each_map_is_compared_by_itself() -> None:
+    """A compressed map, whose exact descriptors are worse, is another case."""
+    worse = [
+        replace(run, compression_reference=97, accuracy=run.accuracy / 2, run_id=f"w{run.run_id}")
+        for run in sending_runs()
+    ]
+    for order in (1, -1):
+        runs = [*sending_runs(), *video_runs(), *worse][::order]
+        cases = [case for case in sending_cases(runs) if case.length == "10"]
+        assert [case.finest.accuracy for case in cases] == [0.92, 0.46]
+        assert ["JPEG" in case.by_way for case in cases] == [True, False]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_parts_are_not_those_of_descriptors(seed: int) -> None:
+    others = [
+        replace(run, descriptor_coding="int8", accuracy=0.01, run_id=f"c{run.run_id}")
+        for run in part_runs()
+    ]
+    runs = [*part_runs(), *others]
+    random.Random(seed).shuffle(runs)
+    parts = [run for one in part_columns(runs) for run in (one.clean, *one.damaged.values())]
+    assert ids(parts) == ids(part_runs())
+
+
 def test_descriptors_of_compressed_pictures_are_not_compared() -> None:
     damaged = [replace(run, compression_query=50) for run in sending_runs()]
     assert sending_cases(damaged) == []
@@ -194,8 +219,9 @@ def test_descriptors_of_compressed_pictures_are_not_compared() -> None:
 
 def test_codings_are_found_by_their_bytes() -> None:
     said = beyond_findings([*sending_runs(), *video_runs()])["corridor"]
-    assert "weighs, by technique: exact 40.0 kB, " in said.replace("\u202f", " ")
-    assert "sketch 1.32 kB" in said.replace("\u202f", " ")
+    assert "weighs, by technique: exact 40.0 kB; " in said.replace("\u202f", " ")
+    assert "sketch 1.32 kB; projected none; JPEG 100 kB" in said.replace("\u202f", " ")
+    assert said.count("(K = 10)") == 1
 
 
 def test_jpeg_of_another_map_is_no_rival_of_video() -> None:
@@ -248,7 +274,7 @@ def test_findings_answer_each_question() -> None:
     assert text.startswith("at c = 97 “dtw” answers best, 75.0 % (mean over 2 techniques); ")
     assert "c = 97 “luminance” alone changes most: −35.0 points, all of JPEG −40.0 (K = 1" in text
     assert "H.265, groups of 8 saves 75 to 75 % of JPEG's bytes" in text
-    assert "AV1" not in text
+    assert "AV1, groups of 8 saves" not in text
     assert "in which nothing can be read (16 px), hog still recognises 95.0 %" in text
     assert "“dtw” answers best, 85.0" in found["corridor, with stops"]
 
