@@ -1,6 +1,7 @@
 """The engineer's question: the cheapest setting that is accurate enough."""
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
@@ -99,14 +100,14 @@ def _of_descriptors(runs: Sequence[RunRecord]) -> str:
     if not any(run.coding_shared_bytes > 0 for run in runs):
         return ""
     return (
-        " Descriptors are made by who sends them; what must be there before the first is not in "
-        "the bytes of a window, and stands beside them."
+        " Descriptors are made by who sends them; what must be there before the first stands "
+        "beside the bytes of a window, with a plus."
     )
 
 
 def _known_before(run: RunRecord) -> str:
     shared = run.coding_shared_bytes
-    return f"and {size_text(shared)} before" if shared > 0 else ""
+    return f"+ {size_text(shared)}" if shared > 0 else ""
 
 
 def _can_be_chosen(run: RunRecord) -> bool:
@@ -194,4 +195,8 @@ def _compressions(run: RunRecord) -> str:
         said = compression_text(query)
     else:
         said = f"{compression_text(query)} query, {compression_text(reference)} map"
-    return f"{said}, sent as {run.descriptor_coding}" if run.descriptor_coding else said
+    if not run.descriptor_coding:
+        return said
+    # The names of its parameters are in the run itself.
+    coding = re.sub(r"\w+=", "", run.descriptor_coding)
+    return coding if said == compression_text(-1) else f"{said}, {coding}"

@@ -85,7 +85,7 @@ def test_descriptors_are_a_choice_by_bytes_and_not_by_time() -> None:
     runs = [replace(run, accuracy=0.97) for run in (coded, WHOLE)]
     chosen = [row for row in choices_table(runs).rows if not row.absent]
     by_bytes = [row for row in chosen if "bytes" in row.cells[2].text]
-    assert {row.cells[5].text for row in by_bytes} == {"as is, sent as sketch"}
+    assert {row.cells[5].text for row in by_bytes} == {"sketch"}
     assert {row.cells[5].text for row in chosen if row not in by_bytes} == {"97"}
     assert math.isnan(frame_seconds(coded))
     timed = replace(coded, encode_s=0.5, match_s=0.25, coding_s=0.125)
@@ -96,7 +96,7 @@ def test_descriptors_are_a_choice_by_bytes_and_not_by_time() -> None:
     assert "before the first" in learned.caption
     reached = [row for row in learned.rows if not row.absent]
     notes = {row.cells[7].note for row in reached if row.cells[5].text != "97"}
-    assert notes == {"and 1.24\u202fMB before"}
+    assert notes == {"+ 1.24\u202fMB"}
 
 
 def test_one_part_of_jpeg_is_no_choice_and_video_is_one() -> None:

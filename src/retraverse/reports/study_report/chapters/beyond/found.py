@@ -23,6 +23,7 @@ from retraverse.reports.study_report.words import length_words, place_text, size
 from retraverse.reports.wording import percent, points
 from retraverse.studies.judging.selection import data_per_answer
 from retraverse.studies.keeping.records import RunRecord
+from retraverse.techniques.sending import CODINGS
 
 __all__ = ["beyond_findings"]
 
@@ -153,9 +154,9 @@ def _bytes_of_ways(cases: Sequence[WayCase]) -> str:
     fixed = {length for length in lengths if length.isdigit()}
     longest = max(fixed or lengths, key=lambda length: (len(length), length))
     here = [case for case in cases if case.length == longest]
-    words = [
-        f"{name} {_span(name, here)}" for name in dict.fromkeys(n for c in here for n in c.by_way)
-    ]
+    tried = {name for case in here for name in case.by_way}
+    # Video is told of by itself.
+    words = [f"{name} {_span(name, here)}" for name in (*CODINGS, JPEG) if name in tried]
     return (
         f"a window no worse than with exact descriptors weighs, by technique: {'; '.join(words)} "
         f"(K = {longest})."

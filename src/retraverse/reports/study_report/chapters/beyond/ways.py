@@ -248,7 +248,9 @@ def _bytes(case: WayCase, way: str) -> Cell:
     run = case.cheapest(way)
     if run is None:
         return Cell("none", math.inf)
-    return Cell(size_text(data_per_answer(run)), data_per_answer(run), run, note=sent_text(run))
+    several = len({sent_text(run) for run in case.by_way[way]}) > 1
+    note = sent_text(run) if several else ""
+    return Cell(size_text(data_per_answer(run)), data_per_answer(run), run, note=note)
 
 
 def _saved(share: float) -> Cell:
