@@ -208,12 +208,11 @@ def _brief(record: "RunRecord") -> dict[str, Any]:
 
 
 def _sent(record: "RunRecord") -> str:
-    """Return what travelled: "pictures", "H.265 crf 36, groups of 8", "pictures as int8"."""
+    """Return what travelled: "pictures", "H.265 crf 36, groups of 8", or descriptors: "int8"."""
     from retraverse.reports.study_report.words import damage_text
 
-    pictures = damage_text(record) if record.video else "pictures"
-    coding = record.descriptor_coding
-    return f"descriptors of {pictures}, {coding}" if coding else pictures
+    pictures = damage_text(record) if record.video else ""
+    return ", ".join(filter(None, (pictures, record.descriptor_coding))) or "pictures"
 
 
 def _print_reasons(out: Path) -> None:
