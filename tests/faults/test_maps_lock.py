@@ -1,8 +1,11 @@
 """Two processes and one map: one writes, the other is told so, and readers notice nothing."""
 
+import json
 import os
+import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -88,31 +91,41 @@ def test_readers_never_see_a_map_half_replaced(tmp_path: Path) -> None:
     """Load over and over while another process grows and replaces the map."""
     place = tmp_path / "grown.map"
     maps_writer.build(place, (0, 3))
-    writer = subprocess.Popen(
-        [sys.executable, maps_writer.__file__, "random", str(tmp_path), "7"],
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        stdin=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-    )
+    with (tmp_path / "said").open("wb") as said:
+        writer = subprocess.Popen(
+            [sys.executable, maps_writer.__file__, "random", str(tmp_path), "7"],
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            stdin=subprocess.PIPE,
+            stdout=said,
+        )
     assert writer.stdin
     writer.stdin.write(b"go\n")
     writer.stdin.flush()
     try:
-        lengths = set()
-        for _ in range(300):
+        lengths: set[int] = set()
+        n_loaded, end = 0, time.monotonic() + 60
+        # However slowly the writer starts: until it was seen at work.
+        while n_loaded < 300 or (len(lengths) <= 2 and time.monotonic() < end):
             route = load_map(place)
             lengths.add(len(route))
+            n_loaded += 1
             assert snapshot(route)["frames"]
     finally:
-        # Its forked writer dies with it: it is in the same group of none but these two.
-        stop(writer)
+        stop(writer, tmp_path / "said")
     assert len(lengths) > 2, "nothing changed while we looked"
 
 
-def stop(writer: subprocess.Popen[bytes]) -> None:
-    children = Path(f"/proc/{writer.pid}/task/{writer.pid}/children")
-    for child in children.read_text().split():
-        os.kill(int(child), 9)
-    assert writer.stdin
-    writer.stdin.close()
-    assert writer.wait(10) == 0
+def stop(writer: subprocess.Popen[bytes], said: Path) -> None:
+    """End the process that writes, and then the one that started it."""
+    try:
+        end = time.monotonic() + 30
+        while '["pid"' not in said.read_text() and time.monotonic() < end:
+            time.sleep(0.01)
+        lines = [json.loads(line) for line in said.read_text().splitlines()]
+        (child,) = (line[1] for line in lines if line[0] == "pid")
+        os.kill(child, signal.SIGKILL)
+        assert writer.stdin
+        writer.stdin.close()
+        assert writer.wait(30) == 0
+    finally:
+        writer.kill()
