@@ -51,6 +51,7 @@ def _open_report(browser: "Browser") -> "Iterator[Opener]":
 
     def open_report(path: Path, width: int, **settings: Any) -> Opened:
         context = browser.new_context(viewport={"width": width, "height": 900}, **settings)
+        context.set_default_timeout(120_000)
         contexts.append(context)
         opened = Opened(context.new_page())
         page = opened.page
@@ -122,7 +123,7 @@ def test_the_slider_walks_along_the_route(open_report: Opener, judged: Path) -> 
     slider.press("End")
     wrong_or_right = page.locator("[data-walk=verdict]").inner_text()
     assert wrong_or_right.split(",")[0] in {"correct", "wrong"}
-    assert page.evaluate("document.querySelector('#walk .query img').naturalWidth") == 64
+    page.wait_for_function("document.querySelector('#walk .query img').naturalWidth === 64")
     assert is_quiet(opened)
 
 

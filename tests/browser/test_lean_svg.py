@@ -58,6 +58,7 @@ def test_nothing_that_is_seen_is_lost(
     draw(tmp_path)
     assert len(pairs) >= least
     context = browser.new_context(viewport={"width": 1300, "height": 900})
+    context.set_default_timeout(120_000)
     page = context.new_page()
     for original, lean in pairs:
         expected, got = (seen(page, text) for text in (original, lean))

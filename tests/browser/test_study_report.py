@@ -55,6 +55,7 @@ def _open_page(browser: "Browser") -> "Iterator[Opener]":
 
     def open_page(address: str, width: int = 1600, **settings: Any) -> Opened:
         context = browser.new_context(viewport={"width": width, "height": 900}, **settings)
+        context.set_default_timeout(120_000)
         contexts.append(context)
         opened = Opened(context.new_page())
         page = opened.page
@@ -124,7 +125,7 @@ def test_a_choice_opens_its_run(open_page: Opener, report: Path, width: int) -> 
     dialog = page.locator("#run")
     dialog.locator("h2", has_text=technique.split(",")[0]).wait_for()
     shown = dialog.locator(".figure-value").first.inner_text().split()[0]
-    assert shown in row.text_content(timeout=5000)  # type: ignore[operator]
+    assert shown in row.text_content()  # type: ignore[operator]
     page.keyboard.press("Escape")
     if width > 1000:
         table.locator("th", has_text="Bytes of a window").locator("button").click()
@@ -182,7 +183,7 @@ def test_a_click_on_a_row_opens_its_run(open_page: Opener, report: Path) -> None
     row.locator("td").nth(3).click()
     dialog = page.locator("#run")
     dialog.locator("h2", has_text="cohog on Corridor").wait_for()
-    assert "cell_size 16" in dialog.locator(".settings").text_content(timeout=5000)  # type: ignore[operator]
+    assert "cell_size 16" in dialog.locator(".settings").text_content()  # type: ignore[operator]
     assert dialog.locator(".run-plot img").evaluate("image => image.decode().then(() => true)")
     assert dialog.get_by_text("Windows answered correctly").count() == 1
     page.keyboard.press("Escape")

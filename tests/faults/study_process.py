@@ -8,6 +8,7 @@ from pathlib import Path
 
 from tests.unit.studies.tiny import tiny_plan, tiny_registered
 
+from retraverse.studies import engine
 from retraverse.studies.engine import run_study
 
 PLAN = {
@@ -25,6 +26,8 @@ def main() -> None:
         with tiny_registered():
             run_study(tiny_plan(data, **HANGING), data / "study", workers=2)
         return
+    # Every record is on disk at once: a kill finds some, however short the study is.
+    engine.FLUSH_S = 0.0
     cache = Path(sys.argv[3]) if len(sys.argv) > 3 else None
     with tiny_registered():
         plan = tiny_plan(data, **PLAN)

@@ -121,8 +121,8 @@ def stop(writer: subprocess.Popen[bytes], said: Path) -> None:
         end = time.monotonic() + 30
         while '["pid"' not in said.read_text() and time.monotonic() < end:
             time.sleep(0.01)
-        lines = [json.loads(line) for line in said.read_text().splitlines()]
-        (child,) = (line[1] for line in lines if line[0] == "pid")
+        lines = said.read_text().splitlines()
+        (child,) = (json.loads(line)[1] for line in lines if line.startswith('["pid"'))
         os.kill(child, signal.SIGKILL)
         assert writer.stdin
         writer.stdin.close()

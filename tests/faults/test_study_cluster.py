@@ -1,5 +1,6 @@
 """Scheduler and workers as separate processes, by TLS, as docs/cluster.md tells to start them."""
 
+import json
 import os
 import re
 import shutil
@@ -12,7 +13,14 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
-from tests.unit.studies.tiny import ROOT, hashes, tiny_plan, tiny_registered, write_dataset
+from tests.unit.studies.tiny import (
+    ROOT,
+    hashes,
+    tiny_plan,
+    tiny_registered,
+    wait_for,
+    write_dataset,
+)
 
 from retraverse.errors import ConfigError, InputError, MissingExtraError
 from retraverse.studies.engine import run_study
@@ -70,20 +78,16 @@ def process(environment: dict[str, str], *words: str) -> Iterator[subprocess.Pop
         started.wait()
 
 
-def free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        return int(server.getsockname()[1])
-
-
 def test_tls_cluster_gives_the_same_records_though_a_worker_is_killed(
-    data: Path, tmp_path: Path
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     dask = pytest.importorskip("dask", reason="the extra cluster is not installed")
     pytest.importorskip("distributed", reason="the extra cluster is not installed")
     environment = make_certificates(tmp_path / "certificates")
     slow = '[{ name = "tiny", parameters = { trouble = "die" } }, "tiny"]'
     plan = tiny_plan(data, techniques=slow)
-    address = f"tls://127.0.0.1:{free_port()}"
+    monkeypatch.setattr(cluster, "WORKERS_S", 240)
+    where = tmp_path / "scheduler.json"
     note = tmp_path / "death note"
     note.touch()
     settings = {
@@ -91,9 +95,11 @@ def test_tls_cluster_gives_the_same_records_though_a_worker_is_killed(
         for name, value in environment.items()
     }
     with ExitStack() as stack:
-        place = address.removeprefix("tls://").split(":")
-        words = ("scheduler", "--protocol", "tls", "--no-dashboard")
-        stack.enter_context(process(environment, *words, "--host", place[0], "--port", place[1]))
+        words = ["scheduler", "--protocol", "tls", "--no-dashboard", "--host", "127.0.0.1"]
+        words += ["--port", "0", "--scheduler-file", str(where)]
+        stack.enter_context(process(environment, *words))
+        wait_for(lambda: where.exists() and where.stat().st_size > 0, seconds=120)
+        address = json.loads(where.read_text())["address"]
         fatal = {**environment, "RETRAVERSE_TEST_DEATH_NOTE": str(note)}
         for _ in range(2):
             stack.enter_context(
@@ -116,8 +122,11 @@ def test_wrong_addresses(address: str) -> None:
 def test_nothing_answers(data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed", reason="the extra cluster is not installed")
     monkeypatch.setattr(cluster, "CONNECT_S", 0.2)
-    with pytest.raises(InputError, match="nothing answers"):
-        run_study(tiny_plan(data), tmp_path / "study", cluster=f"tcp://127.0.0.1:{free_port()}")
+    with socket.socket() as nobody:  # Bound and not listening: nobody else gets the port.
+        nobody.bind(("127.0.0.1", 0))
+        address = f"tcp://127.0.0.1:{nobody.getsockname()[1]}"
+        with pytest.raises(InputError, match="nothing answers"):
+            run_study(tiny_plan(data), tmp_path / "study", cluster=address)
 
 
 def test_without_dask(data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

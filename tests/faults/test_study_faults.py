@@ -22,6 +22,7 @@ from tests.unit.studies.tiny import (
     hashes,
     tiny_plan,
     tiny_registered,
+    wait_for,
     write_dataset,
 )
 
@@ -59,23 +60,28 @@ def test_kill_at_any_instant_then_resume(
     seed = int(os.environ.get("RETRAVERSE_SEED", str(random.randrange(10**6))))
     print("seed", seed)
     rng = random.Random(seed)
-    n_resumed = 0
-    for attempt in range(scaled(20)):
+    n_resumed, n_attempts = 0, max(2, scaled(20))
+    for attempt in range(n_attempts):
         study = tmp_path / f"study {attempt}"
-        start_and_kill(data, study, rng.uniform(0.0, 0.8 * whole.seconds))
+        # Every second one is killed when it has something to go on from.
+        is_begun = attempt % 2 == 1
+        life_s = rng.uniform(0.0, (0.2 if is_begun else 1.5) * whole.seconds)
+        start_and_kill(data, study, life_s, is_begun=is_begun)
         result = run_study(tiny_plan(data, **PLAN), study, workers=0)
         assert result.n_kept + result.n_ok == 36
         n_resumed += result.n_kept
         assert hashes(read_study(study)) == expected
         assert left_overs(study) == []
-    print("runs kept over all kills:", n_resumed)
+    assert n_resumed, "no kill found a record on disk: this would test nothing"
 
 
-def start_and_kill(data: Path, study: Path, life_s: float) -> None:
-    """Run a study in another process and kill -9 it `life_s` after it began."""
+def start_and_kill(data: Path, study: Path, life_s: float, *, is_begun: bool) -> None:
+    """Run a study in another process and kill -9 it `life_s` after it began, or had a record."""
     process = start(data, study)
     assert process.stdout
     assert process.stdout.readline() == "go\n"
+    if is_begun:
+        wait_for(lambda: any((study / "records").glob("*.parquet")), seconds=60)
     time.sleep(life_s)
     process.send_signal(signal.SIGKILL)
     process.wait()
@@ -332,10 +338,3 @@ def test_workers_end_with_the_process_they_serve(data: Path, tmp_path: Path) -> 
     coordinator.communicate(timeout=HANG_S / 2)
     assert time.monotonic() - began < HANG_S / 2
     assert coordinator.returncode == -signal.SIGKILL
-
-
-def wait_for(happened: Callable[[], bool], *, seconds: float) -> None:
-    until = time.monotonic() + seconds
-    while not happened():
-        assert time.monotonic() < until, "it did not happen in time"
-        time.sleep(0.05)

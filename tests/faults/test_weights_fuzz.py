@@ -41,10 +41,14 @@ def _is_our_own(event: str, arguments: tuple[object, ...]) -> bool:
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _no_hang_goes_unseen() -> Iterator[None]:
+def _what_runs_is_seen() -> None:
     sys.addaudithook(_watch)
+
+
+@pytest.fixture(autouse=True)
+def _no_hang_goes_unseen() -> Iterator[None]:
     # A reader that never ends cannot be stopped from Python; the whole run would hang.
-    faulthandler.dump_traceback_later(900, exit=True)
+    faulthandler.dump_traceback_later(3600, exit=True)
     yield
     faulthandler.cancel_dump_traceback_later()
 
@@ -97,6 +101,7 @@ MUTATIONS: tuple[Callable[[bytearray, random.Random], bytes], ...] = (
 
 
 @pytest.mark.heavy
+@pytest.mark.timeout(3000)
 @pytest.mark.parametrize("kind", SAMPLES)
 def test_damaged_file_is_read_or_refused(
     kind: str, tmp_path: Path, scaled: Callable[[int], int]

@@ -1,7 +1,8 @@
 """Trains in children that are killed with SIGKILL; run by test_training_kill.py.
 
-Forking after PyTorch is imported spares its second of import for every life. Arguments: folder,
-seed. Prints one JSON line: kills, lives that found a checkpoint, the last losses and the weights.
+Forking after PyTorch has trained a little spares its seconds of imports for every life. Arguments:
+folder, seed. Prints one JSON line: kills, lives that found a checkpoint, the last losses and the
+weights.
 """
 
 import json
@@ -9,11 +10,14 @@ import os
 import random
 import signal
 import sys
+import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
 from tests.unit.training.tiny import QUICK, Line
 
+from retraverse.files import write_whole
 from retraverse.training.loop import CHECKPOINT, LoopSettings, run_loop
 
 SETTINGS = LoopSettings(
@@ -26,13 +30,15 @@ def live(folder: Path) -> None:
     result = run_loop(Line(), SETTINGS, folder, resume=True)
     weights = [value for one in result.network.parameters() for value in one.flatten().tolist()]
     said = {"first_step": result.first_step, "weights": weights, "losses": result.losses[-3:]}
-    (folder / "result.json").write_text(json.dumps(said))
+    write_whole(folder / "result.json", json.dumps(said).encode())
 
 
 def main() -> None:
     folder, seed = Path(sys.argv[1]), int(sys.argv[2])
     dice = random.Random(seed)
     n_kills = n_resumed = 0
+    with tempfile.TemporaryDirectory() as warm:
+        run_loop(Line(), replace(SETTINGS, steps=2), Path(warm))
     while not (folder / "result.json").exists():
         before = (folder / CHECKPOINT).exists()
         child = os.fork()
@@ -40,7 +46,11 @@ def main() -> None:
             live(folder)
             os._exit(0)
         if n_kills < 5:
-            time.sleep(dice.uniform(0.01, 0.15))
+            # The first may die before it did anything, the others have something to go on from.
+            end = time.monotonic() + 60
+            while n_kills and not (folder / CHECKPOINT).exists() and time.monotonic() < end:
+                time.sleep(0.001)
+            time.sleep(dice.uniform(0.001, 0.05))
             os.kill(child, signal.SIGKILL)
             n_kills += 1
             n_resumed += before

@@ -183,13 +183,13 @@ def test_the_users_log_level_survives_threads_that_overlap() -> None:
     def first() -> None:
         with quiet_opencv():
             first_is_in.set()
-            second_is_in.wait(5)
+            second_is_in.wait(60)
 
     def second() -> None:
-        first_is_in.wait(5)
+        first_is_in.wait(60)
         with quiet_opencv():
             second_is_in.set()
-            threads[0].join(5)
+            threads[0].join(60)
             levels.append(log.getLogLevel())
 
     levels: list[int] = []
@@ -197,7 +197,7 @@ def test_the_users_log_level_survives_threads_that_overlap() -> None:
     for thread in threads:
         thread.start()
     for thread in threads:
-        thread.join(10)
+        thread.join(300)
     assert levels == [0]
     assert log.getLogLevel() == before
 

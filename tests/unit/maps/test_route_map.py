@@ -428,13 +428,13 @@ def test_threads_of_one_program_are_kept_apart_too(tmp_path: Path) -> None:
     class Waiting(FakeTechnique):
         def describe(self, image: Any) -> Any:
             inside.set()
-            go_on.wait(10)
+            go_on.wait(60)
             return super().describe(image)
 
     slow = load_map(tmp_path / "a", technique=Waiting())
     growing = threading.Thread(target=slow.extend, args=(frames(1, first=2),))
     growing.start()
-    assert inside.wait(10)
+    assert inside.wait(60)
     with pytest.raises(MapError, match="another process is writing this map"):
         load_map(tmp_path / "a").extend(frames(1))
     go_on.set()

@@ -4,7 +4,7 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -131,3 +131,11 @@ def tiny_text(data: Path, **changes: str) -> str:
 def hashes(records: tuple[RunRecord, ...]) -> dict[str, str]:
     """Return what must be the same whoever runs a study and however often it was interrupted."""
     return {record.run_id: record.content_hash() for record in records}
+
+
+def wait_for(happened: Callable[[], bool], *, seconds: float) -> None:
+    """Wait until something has happened, for so long at most."""
+    until = time.monotonic() + seconds
+    while not happened():
+        assert time.monotonic() < until, "it did not happen in time"
+        time.sleep(0.005)

@@ -3,6 +3,7 @@
 import hashlib
 import random
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -23,7 +24,7 @@ KNOWN = Seal(len(CONTENT), SHA256)
 
 def plan(address: str, folder: Path, expected: Seal | None = None, **settings: Any) -> DownloadPlan:
     return plan_download(
-        address, folder / "weights.bin", expected, pause_s=0.01, timeout_s=5.0, **settings
+        address, folder / "weights.bin", expected, pause_s=0.01, timeout_s=60.0, **settings
     )
 
 
@@ -158,17 +159,18 @@ def test_server_that_does_not_give_the_file(
     assert left_in(tmp_path) == []
 
 
-def test_nobody_there_says_so_at_once(tmp_path: Path) -> None:
-    with serving(CONTENT) as server:
-        pass
-    began = time.monotonic()
-    with pytest.raises(DownloadError, match="Connection refused; is there a network"):
-        fetch(plan_download(server.address, tmp_path / "weights.bin"))
-    assert time.monotonic() - began < 2
+def test_nobody_there_says_so_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Bound and not listening: refused whoever looks for a port meanwhile.
+    with socket.socket() as nobody:
+        nobody.bind(("127.0.0.1", 0))
+        address = f"http://127.0.0.1:{nobody.getsockname()[1]}/weights.bin"
+        monkeypatch.setattr(time, "sleep", lambda _: pytest.fail("it tried again"))
+        with pytest.raises(DownloadError, match="Connection refused; is there a network"):
+            fetch(plan_download(address, tmp_path / "weights.bin"))
 
 
 def test_silence_counts_as_cut(tmp_path: Path) -> None:
-    with serving(CONTENT, pause_s=0.3) as server, pytest.raises(DownloadError, match="tried 2"):
+    with serving(CONTENT, pause_s=5) as server, pytest.raises(DownloadError, match="tried 2"):
         fetch(
             plan_download(server.address, tmp_path / "w", pause_s=0.01, timeout_s=0.05, attempts=2)
         )
@@ -212,7 +214,7 @@ def test_killed_process_is_carried_on(tmp_path: Path) -> None:
         "from retraverse.weights.download import fetch, plan_download\n"
         "fetch(plan_download(sys.argv[1], Path(sys.argv[2])))\n"
     )
-    with serving(CONTENT, pause_s=0.05) as server:
+    with serving(CONTENT, pause_s=0.5) as server:
         command = [sys.executable, "-c", code, server.address, str(tmp_path / "weights.bin")]
         process = subprocess.Popen(command)
         part = tmp_path / "weights.bin.part"

@@ -31,7 +31,7 @@ def _server(tmp_path: Path) -> Iterator[StudyServer]:
     thread.start()
     yield server
     server.close()
-    thread.join(10)
+    thread.join(60)
     assert not thread.is_alive()
 
 
