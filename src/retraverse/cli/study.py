@@ -117,19 +117,13 @@ def show(
         print_json([_brief(record) for record in records])
         return
     rows = [list(map(str, _line(record))) for record in records]
-    head = (
-        "dataset",
-        "technique",
-        "matcher",
-        "K",
-        "c",
-        "size",
-        "sent",
-        "accuracy",
-        "AUC",
-        "status",
-    )
-    print_table(rows, head=head)
+    settings = ("dataset", "technique", "matcher", "K", "c", "size", "sent")
+    head = [*settings, "accuracy", "AUC", "status"]
+    at = head.index("sent")
+    if all(row[at] == "pictures" for row in rows):  # Of interest where something else was.
+        rows = [row[:at] + row[at + 1 :] for row in rows]
+        head.remove("sent")
+    print_table(rows, head=tuple(head))
 
 
 @app.command("report")

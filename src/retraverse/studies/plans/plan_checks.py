@@ -7,7 +7,7 @@ from contextlib import suppress
 from retraverse.datasets.known import Dataset
 from retraverse.errors import InputError, RetraverseError
 from retraverse.studies.plans.plan import CHUNK_FRAMES, PicturePair, StudyPlan
-from retraverse.techniques.sending import Coding, coding_label
+from retraverse.techniques.sending import CODINGS, Coding, coding_label
 
 __all__ = ["PlanError", "plan_problems"]
 
@@ -61,6 +61,13 @@ def _coding_problems(plan: StudyPlan) -> list[str]:
     size = next((pair.query.resize for pair in plan.pairs), None)
     for choice in plan.techniques:
         sent = plan.sent_by(choice)
+        strange = [one for one in sent if one is not None and type(one) not in CODINGS.values()]
+        if strange:
+            problems.append(
+                f"technique {choice.name}: sent: got {strange[0]!r}, expected what "
+                "retraverse.techniques.sending.coding returns, or None for pictures"
+            )
+            continue
         if len(set(sent)) < max(1, len(sent)):
             problems.append(f"technique {choice.name}: sent: got {_labels(sent) or 'nothing'}, "
                             "expected at least one, each once")  # fmt: skip

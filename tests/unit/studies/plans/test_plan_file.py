@@ -12,9 +12,10 @@ from retraverse.images import Encoder, VideoGroups, Worsening
 from retraverse.images.jpeg_parts import JPEG_PARTS
 from retraverse.images.quantisation import STANDARD_TABLES
 from retraverse.studies.plans.plan import StudyPlan, TechniqueChoice, compression_pairs
+from retraverse.studies.plans.plan_checks import plan_problems
 from retraverse.studies.plans.plan_file import PlanError, load_plan, read_plan
 from retraverse.studies.plans.tables_file import save_tables
-from retraverse.techniques.sending import coding_label
+from retraverse.techniques.sending import coding, coding_label
 
 
 @pytest.fixture(scope="module")
@@ -120,6 +121,19 @@ def test_what_is_sent_is_the_plans_or_the_techniques_own(data: Path) -> None:
     ]
     assert names == [[None, "int8", "sketch(bits=64)"], ["exact"]]
     assert plan.n_runs == 2 * (3 + 1)
+
+
+@pytest.mark.parametrize(
+    ("sent", "problem"),
+    [
+        ((), "sent: got nothing, expected at least one, each once"),
+        ((coding("int8"), coding("int8")), "sent: got int8, int8, expected at least one"),
+        (("exact",), "sent: got 'exact', expected what retraverse.techniques.sending.coding"),
+    ],
+)
+def test_what_is_sent_by_a_plan_made_in_python(data: Path, sent: Any, problem: str) -> None:
+    plan = replace(plan_of(data, ""), sent=sent)
+    assert [problem in line for line in plan_problems(plan)] == [True]
 
 
 def test_a_parameter_follows_the_size_of_the_pictures(data: Path) -> None:
